@@ -88,8 +88,10 @@ def test_what_is_foreseen_is_what_least_squares_give(robot):
     order, after = chosen(design, rows, scatter(touches, design.errors), 5)
     taken = rows[order].reshape(-1, rows.shape[2])
 
-    expected = np.linalg.inv(np.linalg.inv(design.covariance) + taken.T @ taken)
+    expected = np.linalg.inv(np.linalg.inv(design.root @ design.root.T) + taken.T @ taken)
     size = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(
-        after[-1].covariance / np.outer(size, size), expected / np.outer(size, size), atol=1e-4
+        after[-1].root @ after[-1].root.T / np.outer(size, size),
+        expected / np.outer(size, size),
+        atol=1e-4,
     )

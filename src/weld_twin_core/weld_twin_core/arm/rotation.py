@@ -140,6 +140,11 @@ def quaternion_from_matrix(matrix: Array) -> Array:
     return np.reshape(canonical, matrix.shape[:-2] + (4,))
 
 
+def wrapped(angle: Array) -> Array:
+    """Return angles [rad] of any shape less whole turns, in [-pi, pi)."""
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
 def nearest_rotation(matrix: Array) -> Array:
     """Return the rotations R that make trace(R' matrix) largest, shape (..., 3, 3)."""
     u, _, vt = np.linalg.svd(matrix)

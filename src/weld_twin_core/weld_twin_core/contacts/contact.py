@@ -13,8 +13,6 @@ from ..errors import DataError
 
 KINDS = ('point', 'length', 'sphere', 'line', 'plane')
 """What a contact can be; how each is seen is in `surfaces`."""
-_TIED = ('distance', 'angle')
-"""What ties two contacts: the distance of two points, the angle of two planes."""
 LOOSE = 1e-4
 """Uncertainty [m, rad] of a length or an angle that came without one: a calliper's reading, and a
 tenth of a millimetre over a metre of straight edge."""

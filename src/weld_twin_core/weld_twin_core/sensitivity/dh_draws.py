@@ -37,7 +37,7 @@ from ..errors import ModelError
 _ROUNDING = 1e-14
 """Remainder of the features, relative to the strongest, that counts as none."""
 _NEGLIGIBLE = 1e-13
-"""Remainder up to which all samples are taken as determined by a few."""
+"""What features may differ from those determined by a few samples, relative to the largest."""
 _MIXTURES = 48
 """Mixtures that stand for all features; a motion with more independent ones is worked on whole."""
 _BLOCK = 504
@@ -75,12 +75,9 @@ class SeamDraws:
         """Those at which draws are worked out."""
         self.spread: Array | None = None
         """From values at those to values at all samples; None where they are all."""
-        self.remainder = 0.0
-        """What the other samples' features differ from those that these determine, relative to the
-        largest; 0 when all samples are worked on."""
         result = _determining(_features(q[:, 1:]))
         if result is not None:
-            self.samples, self.spread, self.remainder = result
+            self.samples, self.spread = result
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
         self._nominal = self._tool_points(nominal)
@@ -116,19 +113,13 @@ class SeamDraws:
         return np.stack([x, yz.real, yz.imag])
 
 
-class _Determining(NamedTuple):
-    samples: NDArray[np.int_]
-    spread: Array
-    remainder: float
-
-
-def _determining(features: Array) -> _Determining | None:
+def _determining(features: Array) -> tuple[NDArray[np.int_], Array] | None:
     """
     Return samples, and the matrix (N, S) that turns values there into values everywhere.
 
     The factorisation is of random mixtures of the features, which depend on each other as the
-    features do; the remainder is that of the features themselves. None if the samples are half of
-    all or more.
+    features do. None if the samples are half of all or more, or if the features themselves differ
+    from those so determined by more than rounding.
     """
     mixing = np.random.default_rng(0).random((_MIXTURES, len(features))) - 0.5
     mixtures = mixing @ features
@@ -140,11 +131,10 @@ def _determining(features: Array) -> _Determining | None:
     spread = np.empty((rank, features.shape[1]))
     spread[:, order[:rank]] = np.eye(rank)
     spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    remaining = np.abs(features[:, order[:rank]] @ spread - features).max()
-    remainder = float(remaining / np.abs(features).max())
-    if remainder > _NEGLIGIBLE:
+    off = np.abs(features[:, order[:rank]] @ spread - features).max()
+    if off > _NEGLIGIBLE * np.abs(features).max():
         return None
-    return _Determining(order[:rank], np.ascontiguousarray(spread.T), remainder)
+    return order[:rank], np.ascontiguousarray(spread.T)
 
 
 def _features(q: Array) -> Array:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..arm.robot import Robot
-from ..arm.rotation import rotation_matrix, transform
+from ..arm.rotation import rotation_matrix, transform, wrapped
 from ..arrays import Array
 from ..effects import Effect
 from ..errors import PathError
@@ -187,7 +187,7 @@ class Placement:
 
     def torch(self, torch: Torch) -> Torch:
         """Return the turned torch."""
-        return replace(torch, rotation=_wrapped(torch.rotation + self.rotation))
+        return replace(torch, rotation=float(wrapped(torch.rotation + self.rotation)))
 
 
 @dataclass(frozen=True)
@@ -365,7 +365,3 @@ class _Search:
             },
         )
         return self.result(label, full(result.x if result.fun < min(costs) else first))
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -88,11 +88,6 @@ class Design:
     of it: with errors of micrometres and places that may be anywhere, rounding would make it
     negative."""
 
-    @property
-    def covariance(self) -> Array:
-        """Return the covariance of the unknowns, shape (P, P)."""
-        return np.asarray(self.root @ self.root.T)
-
     @classmethod
     def of(cls, problem: Problem, model: Model, effects: Sequence[Effect], scale: Scale) -> Design:
         """Return what the touches at hand tell of errors as large as they were found."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...arm.chain import forward, frames
 from ...arm.robot import Robot
-from ...arm.rotation import skew
+from ...arm.rotation import skew, wrapped
 from ...arrays import Array
 
 _EXACT = 1e-9
@@ -77,7 +77,7 @@ def branches(robot: Robot, poses: Array) -> Array:
     wrist = _meeting(arm, 4, 5)
     centre = np.asarray(wrist) - arm.home[:3, 3]
     point = (rotation @ centre) + poses[:, :3, 3]
-    q = (solver(arm, rotation, point) + np.pi) % (2.0 * np.pi) - np.pi
+    q = wrapped(solver(arm, rotation, point))
     # The nearest angle stands in where none exists; those samples do not close.
     gap = np.abs(forward(robot, q) - poses).max(axis=(-2, -1))
     return np.where((gap < 1e-6)[..., None], q, np.nan)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ...arm.chain import forward
 from ...arm.robot import Robot
+from ...arm.rotation import wrapped
 from ...arrays import Array
 
 Mask = NDArray[np.bool_]
@@ -49,9 +50,9 @@ def joined(tracks: Array) -> Array:
     branch; there the branches change places.
     """
     tracks = tracks.copy()
-    steps = np.abs(_turned(np.diff(tracks, axis=1))).max(axis=-1)
+    steps = np.abs(wrapped(np.diff(tracks, axis=1))).max(axis=-1)
     for i in np.flatnonzero((steps > LEAP).any(axis=0)) + 1:
-        apart = np.abs(_turned(tracks[:, i] - tracks[:, i - 1, None])).max(axis=-1)
+        apart = np.abs(wrapped(tracks[:, i] - tracks[:, i - 1, None])).max(axis=-1)
         apart = np.where(np.isnan(apart), np.inf, apart)
         order = np.where(np.isinf(apart).all(axis=1), np.arange(len(tracks)), apart.argmin(axis=1))
         if len(set(order)) == len(order):
@@ -76,8 +77,3 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
         away = away + np.hypot(moved / size, turned)
     joints = np.abs(np.diff(q, axis=-2)).max(axis=-1)
     return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))
-
-
-def _turned(angle: Array) -> Array:
-    """Return angles in [-pi, pi)."""
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -140,7 +140,7 @@ def quaternion_from_matrix(matrix: Array) -> Array:
     return np.reshape(canonical, matrix.shape[:-2] + (4,))
 
 
-def wrapped(angle: Array) -> Array:
+def wrapped(angle: Array | float) -> Array:
     """Return angles [rad] of any shape less whole turns, in [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.diagnosis.algebra.open_directions import shown
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.frames.alignment import chord
-from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
+from weld_twin_core.diagnosis.predicting.leftover import _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
 from weld_twin_core.diagnosis.soundness.efforts import _Loads
@@ -182,12 +182,6 @@ def test_a_smooth_field_has_slopes_and_bends_of_all_three_coordinates():
     (maker,) = problem.features(model)
     columns = smooth_field(maker)[:, :3].reshape(27, -1)
     assert np.linalg.matrix_rank(columns) == 27
-
-
-@pytest.mark.parametrize(('part', 'way'), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (2.0, 1.0)])
-def test_the_way_to_the_middle_is_the_part_of_it_that_unseen_regions_miss(part, way):
-    shifts, labels = np.random.default_rng(5).normal(size=800), np.repeat(np.arange(8), 100)
-    assert _middle(part * shifts, shifts, labels) == pytest.approx(way, abs=1e-9)
 
 
 def test_turns_are_as_far_apart_as_the_ends_of_two_pointers():

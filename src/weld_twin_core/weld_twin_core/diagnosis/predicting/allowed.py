@@ -93,7 +93,7 @@ def allowed(
         left_open(problem, model),
         prior_std=prior.width,
         single=Conditioning(rows, prior, prior.width, models.noise).given(),
-        middle=remaining.middle,
+        middle=1.0,
     )
     return _with_usual_sigma(posterior, model, problem)
 
@@ -147,11 +147,13 @@ def corrected_sigma(posterior: Posterior, model: Model, q: Array) -> float:
     Return how far a robot may be off that is corrected by a model, at postures at rest [m].
 
     What a diagnosis warns of and what `planned` promises. `usual_sigma` says which number.
+    Corrections are made with the effects in the middle of the allowed models.
 
     q: shape (M, n).
     """
-    twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
-    return usual_sigma(posterior, twin, q)
+    effects, known = posterior.centred(model.found)
+    twin = Twin(model.twin(0).robot, of_the_robot((*model.known, *effects)))
+    return usual_sigma(known, twin, q)
 
 
 def _expected(problem: Problem, scale: Scale) -> float:

@@ -42,8 +42,6 @@ the next, a hundred what is a tenth of the noise."""
 AGREED = 2.5
 """Standard errors from which on what neighbours have in common is no chance: of four numbers of them,
 agreeing or not, chance gets so far once in twenty at the most."""
-SURE = 2.0
-"""Standard errors of a gain from region to region from which on it is none."""
 HIDDEN = 0.8
 """Standard errors of a variance that shows nothing which it has on the average: a half normal's mean."""
 ROUNDING = 1e-10
@@ -95,8 +93,6 @@ class Foretold:
     """Which region of posture it lies in, shape (N,)."""
     good: NDArray[np.bool_]
     """Samples that are no outliers, shape (N,)."""
-    middle: float
-    """How far to go from the fitted model to the middle of those allowed to foretell best."""
     at_rest: bool
     """Whether all are stations."""
     left: Array
@@ -138,7 +134,6 @@ class Foretold:
             left = unseen.residual - whole[0] @ columns
             own = _ways(whole[1], columns)
         good = np.concatenate(trusted(scale.weights))
-        use = good[place[0]]
         return cls(
             by_sample(error),
             by_sample(ways, wide),
@@ -146,7 +141,6 @@ class Foretold:
             seen,
             labels[np.flatnonzero(place[1] == 0)].astype(int),
             good,
-            _middle(error[use], ways[-1, use], labels[use]),
             problem.at_rest,
             by_sample(left),
             by_sample(own, wide),
@@ -188,8 +182,7 @@ class Rest(NamedTuple):
 
     ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
     on top of that. ``peaks``, shape (K,) [m], is how far each region was off at its worst, beyond
-    chance. ``middle`` is how far to go from the fitted model to the middle of those allowed, as
-    a share of the way, to predict unseen postures best.
+    chance.
     """
 
     position: float
@@ -197,7 +190,6 @@ class Rest(NamedTuple):
     gears: Array
     turns: Array
     peaks: Array
-    middle: float
 
 
 def leftover(
@@ -241,7 +233,6 @@ def leftover(
         at_turns,
         # An instrument strays as well, and no more of that is the arm's than of the rest.
         _peaks(foretold) * of_gears,
-        foretold.middle,
     )
 
 
@@ -361,26 +352,6 @@ def _likelihood(errors: Array, covariances: Array) -> float:
     whole = covariances + 1e-18 * np.eye(3)
     solved = np.linalg.solve(whole, errors[..., None])[..., 0]
     return -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
-
-
-def _middle(errors: Array, shifts: Array, labels: Array) -> float:
-    """
-    Return how far to go from the fitted model to the middle of those allowed, from 0 to 1.
-
-    Both predict every region from the others, and are weighed by how well they do [1]_. Not at all
-    where the gain is no more than chance from region to region: of an arm that is exact but for what
-    was found, all else that was allowed is noise.
-
-    References
-    ----------
-    .. [1] L. Breiman, "Stacked regressions", Machine Learning 24, 1996.
-
-    """
-    share = float(np.clip(errors @ shifts / max(float(shifts @ shifts), 1e-300), 0.0, 1.0))
-    gain = errors**2 - (errors - share * shifts) ** 2
-    each = np.array([gain[labels == b].sum() for b in np.unique(labels)])
-    sure = each.size > 1 and each.sum() > SURE * np.sqrt(each.size) * each.std(ddof=1)
-    return share if sure else 0.0
 
 
 def _in_common(problem: Problem, foretold: Foretold) -> float:

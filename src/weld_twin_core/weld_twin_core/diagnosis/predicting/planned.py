@@ -56,10 +56,6 @@ JUDGED = 48
 """Other postures of the region, at which it is judged how sure the model is."""
 TRIED = 6000
 """Postures drawn to find so many that are clear."""
-CHOICE = 25.0
-"""Stations at which a diagnosis, which has to choose among small errors, leaves twice what they would
-show it if all errors were fitted: measured on plans that the plant carried out, eleven of 16, 24
-and 40 stations (weld-twin lab coverage --plans, docs/first_measurement.md)."""
 DRAWS = 400
 """Of a tool's error at each posture, to count how many lie within the tolerance."""
 
@@ -111,7 +107,7 @@ def plan_stations(
     own = min(noise, USUAL_NOISE)
     before = _before_any(robot, region[1], own)
     given = Wanted(tolerance, float(np.sqrt(noise**2 - own**2)))
-    return _planned(before, Twin(robot), region, count, given, CHOICE)
+    return _planned(before, Twin(robot), region, count, given)
 
 
 def _before_any(robot: Robot, q: Array, own: float) -> Posterior:
@@ -151,7 +147,7 @@ def plan_more(
             f'a plan in a region needs a tolerance and a noise above zero, and at most the '
             f'{offered} stations that there are'
         )
-    return _planned(posterior, twin, region, count, given, 0.0)
+    return _planned(posterior, twin, region, count, given)
 
 
 def _planned(
@@ -160,9 +156,8 @@ def _planned(
     region: tuple[Array, Array],
     count: int,
     given: Wanted,
-    choice: float,
 ) -> MeasurementPlan:
-    """Return the plan after a posterior; ``choice`` is as `CHOICE`."""
+    """Return the plan after a posterior."""
     anywhere = postures_within_limits(twin.robot, JUDGED)
     still = posterior.at_rest(twin, np.concatenate([*region, anywhere]))
     ways, rest = posterior.position_ways(Features(twin, still, still.joints.t))
@@ -171,16 +166,16 @@ def _planned(
     noise = more + given.noise**2 * np.eye(3)
     draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
 
-    def sure(factor: float) -> tuple[float, float, float]:
-        """Return what `MeasurementPlan` has of a number of stations."""
-        size, beyond = _sizes(factor * seen, own), _sizes(factor * far, rest_far)
+    def sure() -> tuple[float, float, float]:
+        """Return what `MeasurementPlan` has of the stations taken."""
+        size, beyond = _sizes(seen, own), _sizes(far, rest_far)
         length = np.linalg.norm(draws[:, None] * size, axis=-1)
         within = float((length < given.tolerance).mean())
         return float(np.median(size[:, -1])), within, float(np.median(beyond[:, -1]))
 
     taken: list[int] = []
-    told = [sure(1.0)]
-    for number in range(1, count + 1):
+    told = [sure()]
+    for _ in range(count):
         gain = _gains(seen, offered, noise)
         gain[taken] = -np.inf
         taken.append(int(gain.argmax()))
@@ -189,8 +184,7 @@ def _planned(
         # What is still open of every way, as ways of one standard deviation again.
         root = np.linalg.cholesky(np.eye(len(shown)) - shown)
         seen, offered, far = seen @ root, offered @ root, far @ root
-        sigma, within, beyond = sure(1.0 + (choice / number) ** 3)
-        told.append((min(sigma, told[0][0]), within, min(beyond, told[0][2])))
+        told.append(sure())
     return MeasurementPlan(region[1][taken], *np.array(told).T)
 
 

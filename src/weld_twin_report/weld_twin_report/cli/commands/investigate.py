@@ -148,17 +148,19 @@ def _more(
     from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
     from weld_twin_core.effects.dated import of_the_robot
     from weld_twin_core.twin.twin import Twin
-    from weld_twin_msgs_py.files.diagnosis_model import load_model
+    from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
     from weld_twin_nodes.offline.measurement_plan import planned
     from weld_twin_nodes.offline.region import anywhere
 
-    posterior, fitted = read_posterior(robot, args.model), load_model(robot, args.model)
+    posterior, model = read_posterior(robot, args.model), read_model(robot, args.model)
     if posterior is None:
         raise DataError(
             f"the diagnosis '{args.model}' does not say how sure it is; diagnose again"
         )
-    twin = Twin(fitted.robot, of_the_robot(fitted.effects))
+    effects, posterior = posterior.centred(model.found)
+    placed = load_model(robot, args.model).robot
+    twin = Twin(placed, of_the_robot((*model.known, *effects)))
     postures = _in_region(args, robot) if args.region else anywhere(robot, how['spread'])
     wanted = Wanted(tolerance, how['noise'])
     plan = planned(

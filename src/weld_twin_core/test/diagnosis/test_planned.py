@@ -52,3 +52,8 @@ def test_chosen_stations_say_more_than_stations_that_look_alike(plan):
 def test_numbers_that_mean_nothing_are_refused(values):
     with pytest.raises(DataError, match='a plan needs stations, a tolerance'):
         plan_stations(ROBOT, *values)
+
+
+def test_few_stations_promise_what_an_arm_corrected_by_them_keeps():
+    # Four arms with every usual small error kept 0.03 to 0.08 mm after sixteen stations.
+    assert 3e-5 < plan_stations(ROBOT, 16, 2e-4, 3e-5).sigma[-1] < 1e-4

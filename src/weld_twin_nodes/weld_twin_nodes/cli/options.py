@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 
 from .parsing import Options, Parser, add_options, short_help
 
@@ -231,6 +231,15 @@ def refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
         value = getattr(args, name)
         if value or (value is not None and not isinstance(value, bool | str | list | tuple)):
             raise DataError(f'--{name.replace("_", "-")} {why}')
+
+
+def refuse_unknown_effect(option: str, name: str) -> None:
+    """Refuse the name of an effect that there is not; a ModelError lists those there are."""
+    from weld_twin_core.effects import REGISTRY
+
+    if name not in REGISTRY:
+        listed = ', '.join(sorted(REGISTRY))
+        raise ModelError(f'{option}: there is no effect {name!r}; known effects are {listed}')
 
 
 def add_command(subparsers: Any, name: str, command: Any) -> argparse.ArgumentParser:

@@ -31,6 +31,7 @@ from weld_twin_nodes.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from weld_twin_core.twin.program_correction import Caps
     from weld_twin_msgs_py.programs import Context, Program
 
 EXAMPLE = 'weld-twin correct seam.script --robot ur5 --model found/diagnosis.json --out better'
@@ -136,7 +137,6 @@ def _corrected_program(args: argparse.Namespace) -> int:
 
 
 def _by_model(args: argparse.Namespace, context: Context, program: Program) -> int:
-    from weld_twin_core.twin.program_correction import Caps
     from weld_twin_msgs_py.files.whole_files import write_json, write_text
     from weld_twin_nodes.offline.correcting import (
         corrected_program,
@@ -150,8 +150,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
 
-    caps = Caps(*_largest(args))
-    robot = context.robot
+    robot, caps = context.robot, _caps(args)
     setup = 0 if args.setup is None else args.setup - 1
     model = program_model(robot, args.model, args.temperature, setup)
     content = diagnosis_of(args.model)
@@ -161,7 +160,9 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
     entry['notes'] += other_causes(content)
     if args.tolerance:
-        entry['tolerance'] = tolerance_entry(made, model, *_allowed(args))
+        tolerance = _length(args.tolerance, '--tolerance')
+        noise = _length(args.noise or NOISE, '--noise')
+        entry['tolerance'] = tolerance_entry(made, model, tolerance, noise)
     inputs = inputs_of(program=args.program, model=args.model)
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
@@ -175,15 +176,12 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     return 0
 
 
-def _largest(args: argparse.Namespace) -> tuple[float, float]:
-    """Return how far a point may be moved and turned [m, rad]."""
+def _caps(args: argparse.Namespace) -> Caps:
+    from weld_twin_core.twin.program_correction import Caps
+
+    option = '--max-correction'
     length, angle = args.max_correction or LARGEST
-    return _length(length, '--max-correction'), quantity(angle, ('deg', 'rad'), '--max-correction')
-
-
-def _allowed(args: argparse.Namespace) -> tuple[float, float]:
-    """Return the deviation allowed and the noise of what measures it [m]."""
-    return _length(args.tolerance, '--tolerance'), _length(args.noise or NOISE, '--noise')
+    return Caps(_length(length, option), quantity(angle, ('deg', 'rad'), option))
 
 
 def _length(text: str, option: str) -> float:

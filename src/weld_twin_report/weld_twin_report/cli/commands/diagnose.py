@@ -29,6 +29,7 @@ from weld_twin_nodes.cli.options import (
     given_urdf,
     inputs_of,
     output,
+    refuse_unknown_effect,
     robot_of,
     topics_of,
     twin_of,
@@ -157,7 +158,9 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_nodes.offline.region import region
     from weld_twin_nodes.offline.set_up_changes import with_changes
 
-    align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
+    align = frames_named(args.align, '--align')
+    for name in args.exclude_effect:
+        refuse_unknown_effect('--exclude-effect', name)
     changing = families_named(args.may_change, '--may-change')
     if changing and len(args.bag) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
@@ -173,7 +176,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             twin.robot,
             align=align,
             known=twin.effects,
-            exclude=excluded,
+            exclude=tuple(args.exclude_effect),
             holdout=_bounded(recordings[count:]),
             apply=args.apply,
             may_change=tuple(dict.fromkeys([*changing, *more])),
@@ -275,18 +278,6 @@ def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
 
 def _share(own: int, total: int, most: int) -> int:
     return max(ceil(own * min(most / max(total, 1), 1.0)), 2)
-
-
-def _families(names: Sequence[str]) -> tuple[str, ...]:
-    from weld_twin_core.effects import REGISTRY
-
-    for name in names:
-        if name not in REGISTRY:
-            raise ModelError(
-                f'--exclude-effect: there is no effect {name!r}; known effects are '
-                + ', '.join(sorted(REGISTRY))
-            )
-    return tuple(names)
 
 
 @contextmanager

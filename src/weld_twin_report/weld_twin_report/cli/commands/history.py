@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.commands import job, jobs
-from weld_twin_nodes.cli.options import POOL, folder_output, output, pair
+from weld_twin_nodes.cli.options import POOL, folder_output, output, pair, refuse_unknown_effect
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -206,8 +206,6 @@ def changed(args: argparse.Namespace) -> int:
 
 
 def _limits(given: Sequence[str]) -> dict[str, float]:
-    from weld_twin_core.effects import REGISTRY
-
     out = {}
     for text in given:
         effect, value = pair(text, '--limit', 'EFFECT=VALUE, such as backlash=0.0017')
@@ -215,10 +213,7 @@ def _limits(given: Sequence[str]) -> dict[str, float]:
             out[effect] = float(value)
         except ValueError:
             raise DataError(f"--limit: '{value}' is no number") from None
-        if effect not in REGISTRY:
-            raise DataError(
-                f'--limit: there is no effect {effect!r}; known are {", ".join(sorted(REGISTRY))}'
-            )
+        refuse_unknown_effect('--limit', effect)
     return out
 
 

@@ -27,9 +27,7 @@ from weld_twin_nodes.cli.options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from weld_twin_core.arm.robot import Robot
     from weld_twin_core.metrics.performance import Performance
-    from weld_twin_core.recording import Recording
 
 EXAMPLE = 'weld-twin iso9283 my_cycles --robot ur5 --out accuracy'
 SCHEMA = 'weld_twin/iso9283/1'
@@ -53,10 +51,14 @@ def run(args: argparse.Namespace) -> int:
     """Find the cycles, evaluate them, write the results, print a table."""
     from rich.console import Console
 
+    from weld_twin_core import __version__
     from weld_twin_core.diagnosis.algebra.problem import frames_named
     from weld_twin_core.metrics.performance import performance_of
     from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_msgs_py.files.whole_files import write_json, write_text
     from weld_twin_nodes.offline.placed_robot import placed
+
+    from ...report.performance_page import performance_page
 
     nominal = robot_of(args)
     align = frames_named(args.align, '--align')
@@ -65,38 +67,23 @@ def run(args: argparse.Namespace) -> int:
     result = performance_of(recording, robot)
     notes += _warnings(result, align)
     with output(args, RESULT) as place:
-        _write(place, result, recording, robot, notes, args)
+        inputs = inputs_of(recording=args.bag, robot=args.robot)
+        page = performance_page(result, recording, robot.name, notes, inputs)
+        write_text(place / PAGE, page)
+        content = {
+            'schema': SCHEMA,
+            'version': __version__,
+            'robot': robot.name,
+            'recording': recording.name,
+            'align': args.align,
+            **result.as_dict(),
+            'notes': [*notes, *recording.notes],
+            'inputs': [item.as_dict() for item in inputs],
+        }
+        write_json(place / RESULT, content)
     _print(result, notes, Console(width=WIDTH, highlight=False, markup=False))
     print(f'report: {Path(args.out) / PAGE}')
     return 0
-
-
-def _write(
-    place: Path,
-    outcome: Performance,
-    recording: Recording,
-    robot: Robot,
-    notes: Sequence[str],
-    args: argparse.Namespace,
-) -> None:
-    from weld_twin_core import __version__
-    from weld_twin_msgs_py.files.whole_files import write_json, write_text
-
-    from ...report.performance_page import performance_page
-
-    inputs = inputs_of(recording=args.bag, robot=args.robot)
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'robot': robot.name,
-        'recording': recording.name,
-        'align': args.align,
-        **outcome.as_dict(),
-        'notes': [*notes, *recording.notes],
-        'inputs': [item.as_dict() for item in inputs],
-    }
-    write_text(place / PAGE, performance_page(outcome, recording, robot.name, notes, inputs))
-    write_json(place / RESULT, result)
 
 
 def _warnings(result: Performance, align: frozenset[str]) -> list[str]:

@@ -363,7 +363,7 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
     surest. Samples that err against each other have no white noise either. Where none shows anything, a
     motion may still hide some. Shifts count, or all that a contact sees.
     """
-    best, hidden, regions = (AGREED, 0.0), 1.0, np.unique(foretold.region)
+    sure, hidden, regions = list[tuple[float, float]](), 1.0, np.unique(foretold.region)
     sign = 1.0 if foretold.at_rest else -1.0
     sums: dict[int, list[Array]] = {}
     foreseen = np.sqrt(2.0 / regions.size)  # how far a variance of so many draws may be off
@@ -389,9 +389,12 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
         chance = np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
         common = max(agree - open_, min(open_, 0.0) - agree)
         whole = max(square - each_open, common, 1e-300)
-        best = max(best, (common / max(chance, 1e-300), common / whole))
+        if common > AGREED * max(chance, 1e-300):
+            sure.append((common / max(chance, 1e-300), common / whole))
         hidden = min(hidden, HIDDEN * chance / whole)
-    return hidden if best[0] == AGREED and not foretold.at_rest else best[1]
+    if sure:
+        return max(sure)[1]
+    return 0.0 if foretold.at_rest else hidden
 
 
 def _neighbours(

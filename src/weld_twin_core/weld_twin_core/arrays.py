@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Read-only float64 copies with shape and finiteness checked at the public boundary."""
+"""Read-only float64 copies, checked at the public boundary; and which of many samples are taken."""
 
 from typing import Any
 
@@ -53,6 +53,11 @@ def increasing(t: ArrayLike, name: str) -> Array:
             'sort the samples or drop the repeated ones'
         )
     return stamps
+
+
+def spread_over(count: int, most: int) -> NDArray[np.intp]:
+    """Return indices below ``count``, evenly spread, first and last among them; ``most`` at most."""
+    return np.asarray(np.linspace(0, count - 1, min(most, count)).round(), dtype=np.intp)
 
 
 def _short(value: Any) -> str:

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from .arrays import Array, increasing, readonly
+from .arrays import Array, increasing, readonly, spread_over
 from .cameras import Sightings
 from .contacts import Contacts
 from .cubics import hermite
@@ -492,7 +492,7 @@ class Recording:
         out = self
         if self.measured is not None and self.measured.t.size > measurements:
             count = self.measured.t.size
-            index = np.unique(np.linspace(0, count - 1, measurements).round().astype(int))
+            index = spread_over(count, measurements)
             note = f'{index.size} of {count} measurements are used, evenly over the recording'
             thinned = self.measured.take(index)
             out = replace(out, measured=thinned, notes=(*out.notes, note))

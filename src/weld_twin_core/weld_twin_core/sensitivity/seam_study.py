@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arm.robot import Robot
-from ..arrays import Array, readonly
+from ..arrays import Array, readonly, spread_over
 from ..effects import Effect
 from ..errors import DataError
 from ..motion.paths import Path, Torch
@@ -155,8 +155,7 @@ def recorded_study(
     inside = stamps[(stamps >= recording.joints.t[0]) & (stamps <= recording.joints.t[-1])]
     if inside.size < 2:
         raise DataError(f'recording {recording.name!r} has fewer than two samples to study')
-    pick = np.unique(np.linspace(0, inside.size - 1, min(points, inside.size)).round().astype(int))
-    at = readonly(inside[pick], (None,), 'instants')
+    at = readonly(inside[spread_over(inside.size, points)], (None,), 'instants')
     nominal = Twin(robot, known).poses(recording, at)
     tangent = path_tangents(nominal.position)
     out = _away(nominal.rotation, tangent) if normal is None else normal

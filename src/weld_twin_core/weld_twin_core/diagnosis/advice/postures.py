@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arm.clearance import Space
 from ...arm.robot import Robot
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...errors import DataError
 from ...recording import JointMotion
 from ...sequences import halton
@@ -85,7 +85,7 @@ class Room:
     def __init__(self, problem: Problem, robot: Robot, limits: Limits) -> None:
         q = np.concatenate([r.joints.q for r in problem.recordings])
         self._robot, self._limits = robot, limits
-        self._seen = q[np.linspace(0, len(q) - 1, min(len(q), 50)).round().astype(int)]
+        self._seen = q[spread_over(len(q), 50)]
         self._space = Space(robot, self._seen, limits.box)
         middle = np.median(problem.recordings[0].joints.q, axis=0)
         self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]

@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ...twin.features import with_expected_effort
@@ -217,7 +217,7 @@ def _measured(model: Model, recording: Recording, *, points: bool) -> Recording:
     """Return the recording with measurements of an arm without any effect, to compare with."""
     t = recording.joints.t
     if not recording.joints.static:
-        t = t[np.linspace(0, t.size - 1, min(_SAMPLES, t.size)).round().astype(int)]
+        t = t[spread_over(t.size, _SAMPLES)]
     poses = model.twin(0).poses(recording, t)
     seen = Measurements(t, poses.position, None if points else poses.rotation)
     return replace(recording, measured=seen)

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...recording import JointMotion, Recording
 from ..algebra.fit import effect_precision, fit
 from ..algebra.independent_rows import robust_spread
@@ -91,7 +91,7 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
     seen, q = recording.seen, recording.joints.q
     _, first = np.unique(np.round(q / SAME_STATION), axis=0, return_index=True)
     first = np.sort(first)
-    pick = first[np.unique(np.linspace(0, first.size - 1, 2 * SAMPLES).round().astype(int))]
+    pick = first[spread_over(first.size, 2 * SAMPLES)]
     motion = JointMotion(seen.t[pick], q[pick], static=True)
     problem = Problem((Recording(recording.name, motion, seen.take(pick)),), frozenset(FRAMES))
     # Twice as many numbers as are fitted: fewer agree with any arm.

@@ -17,7 +17,7 @@ import numpy as np
 from ...arm.chain import Frames, frames
 from ...arm.dynamics import chain_gravity_torque, payload_torque
 from ...arm.robot import Robot
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...effects.curves import AT_REST
 from ...errors import DataError
 from ...recording import Recording
@@ -179,7 +179,7 @@ def _of_one(recording: Recording, robot: Robot) -> tuple[Array, ...]:
     motion = recording.joints
     expected = with_expected_effort(recording, robot, recording.load_of_effort).effort
     assert expected is not None and recording.effort is not None
-    at = np.unique(np.linspace(0, motion.t.size - 1, 2 * SAMPLES).round().astype(int))
+    at = spread_over(motion.t.size, 2 * SAMPLES)
     sign = recording.load_of_effort
     measured = sign * recording.effort.at(motion.t[at]).T
     chain = frames(robot, motion.q[at])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arm.rotation import nearest_rotation
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from .limits import ENOUGH, FEW, STEPS, WORTH
 
 MOST_LAG = 2.0
@@ -55,7 +55,7 @@ def lag(
     index = np.flatnonzero((t > joints[0] + most) & (t < joints[-1] - most))
     if index.size < ENOUGH:
         return None
-    index = index[np.linspace(0, index.size - 1, min(TRIED, index.size)).round().astype(int)]
+    index = index[spread_over(index.size, TRIED)]
     stamps, seen = t[index], position[index]
     none = Lag(0.0, 0.0, float(stamps.mean()))
     grid = np.linspace(-most, most, TRIED + 1)

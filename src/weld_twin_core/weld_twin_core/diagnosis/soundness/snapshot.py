@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_vector
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...effects.effect import Effect
 from ...effects.frame_errors import BasePose, RootPose, ToolPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
@@ -233,7 +233,7 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):
         seen = recording.seen
-        index = np.unique(np.linspace(0, seen.t.size - 1, share).round().astype(int))
+        index = spread_over(seen.t.size, share)
         joints = JointMotion(seen.t[index], q[index], static=True)
         out.append(replace(recording, joints=joints, measured=seen.take(index)))
     return Snapshot(tuple(out), replace(model, found=()), problem.align)

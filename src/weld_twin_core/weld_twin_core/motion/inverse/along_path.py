@@ -15,7 +15,7 @@ from ...arm.chain import Frames, chain_jacobian, forward, frames
 from ...arm.mounting import rising
 from ...arm.robot import Robot
 from ...arm.rotation import missing, moved
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...errors import ReachError
 from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
 from .closed_form import branches, family
@@ -189,7 +189,7 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
         )
     best = _best_first(robot, starts[:, None], seed)
     starts = starts[best[:_TRACKED]]
-    index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
+    index = spread_over(len(poses), _KNOTS)
     knots = _track(robot, starts, poses[index])
     if len(index) == len(poses):
         return knots

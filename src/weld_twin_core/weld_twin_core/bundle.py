@@ -163,10 +163,10 @@ class _State:
         every = np.ones(len(by_lens), dtype=bool)
         put(UNKNOWNS * seen.camera, by_lens, every)
         at = UNKNOWNS * count
-        slot = np.full(count + len(seen.targets), -1)
-        slot[list(self.start.free)] = at + 6 * np.arange(len(self.start.free))
+        place = np.full(count + len(seen.targets), -1)
+        place[list(self.start.free)] = at + 6 * np.arange(len(self.start.free))
         for body, block in ((seen.camera, of_eye), (count + seen.target, of_target)):
-            put(slot[body], block, slot[body] >= 0)
+            put(place[body], block, place[body] >= 0)
         sizes = np.cumsum([0, *(t.points.size for t in seen.targets)])
         first = at + 6 * len(self.start.free) + sizes[seen.target] + 3 * seen.point
         put(first, of_corner, every)
@@ -245,11 +245,11 @@ class _Point:
         for first in range(0, len(self.state.tool), _TOGETHER):
             some = np.flatnonzero((image >= first) & (image < first + _TOGETHER))
             count = min(_TOGETHER, len(self.state.tool) - first)
-            slot = _numbers(image[some] - first)
-            wide = np.zeros((count, slot.max() + 1, 2, 6))
-            wide[image[some] - first, slot] = of_tool[some]
-            right = np.zeros((count, slot.max() + 1, 2, size))
-            right[image[some] - first, slot] = both[some]
+            place = _numbers(image[some] - first)
+            wide = np.zeros((count, place.max() + 1, 2, 6))
+            wide[image[some] - first, place] = of_tool[some]
+            right = np.zeros((count, place.max() + 1, 2, size))
+            right[image[some] - first, place] = both[some]
             right = right.reshape(count, -1, size)
             q, r = np.linalg.qr(wide.reshape(count, -1, 6))
             taken = _swap(q) @ right

@@ -132,8 +132,8 @@ class Backlash(MemoryEffect):
             return tangent
         _, touched = self._contact(self._theta(view))
         at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
-        held = np.take_along_axis(tangent, at, -1)
-        return held if self.form == 'play' else 2.0 * tangent - held
+        latest = np.take_along_axis(tangent, at, -1)
+        return latest if self.form == 'play' else 2.0 * tangent - latest
 
     def _contact(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return output minus input where a side is touched (else 0), and when it last was."""
@@ -178,9 +178,9 @@ def _reversals(q: Array, state: Any) -> tuple[Array, Any]:
     # Prefix the direction carried over, so that index 0 always holds a motion or rest.
     direction = np.concatenate([np.asarray(moved)[..., None], direction], axis=-1)
     last = np.maximum(last_true(direction != 0.0), 0)
-    held = np.take_along_axis(direction, last, -1)
-    flips = (held[..., 1:] * held[..., :-1] < 0.0).astype(np.float64)
-    return flips, (q[..., -1], held[..., -1])
+    latest = np.take_along_axis(direction, last, -1)
+    flips = (latest[..., 1:] * latest[..., :-1] < 0.0).astype(np.float64)
+    return flips, (q[..., -1], latest[..., -1])
 
 
 _SHARES = (0.03, 0.15)
@@ -196,9 +196,9 @@ class _LoadedSearch(SearchHooks):
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
         """Yield play of a gear that slides easily, where the load keeps it on one flank."""
         torque = load(view, view.robot.index(str(joint)))
-        held = _SHARES[0] * float(np.abs(torque).max(initial=0.0))
-        if held > 0.0 and not _changes(torque, held):
-            yield self.kind(str(joint), 0.0, held)
+        friction = _SHARES[0] * float(np.abs(torque).max(initial=0.0))
+        if friction > 0.0 and not _changes(torque, friction):
+            yield self.kind(str(joint), 0.0, friction)
 
 
 @register
@@ -259,6 +259,6 @@ class LoadedPlay(LinearEffect):
         )
 
 
-def _changes(torque: Array, held: float) -> bool:
+def _changes(torque: Array, friction: float) -> bool:
     """Return whether a load, shape (N,), moves a gear from its flank that friction holds so far."""
-    return bool(np.ptp(torque / np.hypot(torque, held)) > _CHANGED)
+    return bool(np.ptp(torque / np.hypot(torque, friction)) > _CHANGED)

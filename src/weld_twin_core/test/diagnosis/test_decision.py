@@ -364,16 +364,20 @@ def test_families_are_told_largest_first_and_what_they_account_for():
 
 
 @pytest.mark.parametrize(
-    ('believed', 'left', 'status', 'named'),
-    [(0.6, 0.0, 'identified', 1), (0.4, 0.0, 'unknown', 1), (0.6, 0.9, 'unknown', 1)],
+    ('left', 'status'),
+    [(0.0, 'identified'), (0.9, 'unknown')],
 )
-def test_kinds_are_told_and_the_status_says_if_they_are_all(believed, left, status, named):
-    told = structured(
-        left, families=(family('link_length'),), structure=taking(left), believed=(believed,)
-    )
+def test_kinds_are_told_and_the_status_says_if_they_are_all(left, status):
+    told = structured(left, families=(family('link_length'),), structure=taking(left))
     verdict = decide(told)
-    assert (verdict.status, len(verdict.sets)) == (status, named)
-    assert believed > 0.5 or 'imitate' in verdict.reasons[0]
+    assert (verdict.status, len(verdict.sets)) == (status, 1)
+
+
+def test_joints_at_which_a_kind_is_one_error_are_one_set():
+    parallel = tuple(Site('link_offset', joint) for joint in ('joint_2', 'joint_3'))
+    needed = (*((site, 0.4) for site in parallel), (Site('link_offset', ELBOW), 0.2))
+    offsets = replace(family('link_offset'), needed=needed, alike=(parallel,))
+    assert of_families(offsets).sets == (parallel, (Site('link_offset', ELBOW),))
 
 
 # The beliefs themselves -------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from weld_twin_core.diagnosis.hypotheses.search import search
 from weld_twin_core.diagnosis.many.small_errors import many_small
 from weld_twin_core.diagnosis.many.weighed_families import weighed_families
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.effects import REGISTRY
+from weld_twin_core.effects import REGISTRY, BearingTilt
 
 KINDS = (
     'joint_offset',
@@ -24,6 +24,7 @@ KINDS = (
     'joint_compliance',
     'gear_ratio',
 )
+TURNS = ('theta_offset', 'alpha')
 MIDDLE = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
@@ -69,7 +70,7 @@ class Arm:
         return self.frames(bent, rows)[-1][:3, 3]
 
 
-def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1):
+def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1, beside=()):
     """Return the kinds that are named for an arm measured at stations, by their names."""
     robot = wt.load('ur10')
     rng = np.random.default_rng(seed)
@@ -81,6 +82,7 @@ def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1)
         'stations', wt.JointMotion(t, q, static=True), wt.Measurements(t, place)
     )
     problem, start = aligned([stations], robot, align, ())
+    start = start.with_found(beside)
     rest = [name for name in REGISTRY if name not in KINDS]
     few = search(problem, start, [*rest, *KINDS], Beliefs(), lambda text: None)
     fit, scale, precision = many_small(problem, start, rest, Beliefs(), lambda text: None)
@@ -115,6 +117,23 @@ def test_one_cause_and_noise_gets_no_other_kind(change, kind):
     assert list(found) == [kind]
     (site, share), *_ = found[kind].needed
     assert site.joint == wt.load('ur10').joint_names[change[0]] and share > 0.8
+
+
+def test_links_along_parallel_axes_are_told_together():
+    """The offset of one is that of the next: left out one by one, none of them is ever missed."""
+    found = told(1.2, changes=[(2, 'd', 1e-3), (4, 'd', 1e-4)])
+    shares = {site.joint: share for site, share in found['link_offset'].needed}
+    parallel = {'shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint'}
+    assert parallel < set(shares)
+    assert sum(shares[joint] for joint in parallel) > 0.5
+
+
+def test_what_not_every_arm_has_is_named_only_beside_all_that_every_arm_has():
+    """A bearing that wobbles predicts better than any one kind, but all wrong links together do it."""
+    rng = np.random.default_rng(3)
+    turned = [(k, key, 6e-4 * rng.standard_normal()) for k in range(1, 5) for key in TURNS]
+    wobbling = tuple(BearingTilt(joint, [1e-5] * 4) for joint in wt.load('ur10').joint_names[1:4])
+    assert set(told(0.5, changes=turned, beside=wobbling)) <= {'joint_offset', 'link_twist'}
 
 
 def test_noise_alone_gets_no_kind():

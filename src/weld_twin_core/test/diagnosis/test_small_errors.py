@@ -11,7 +11,13 @@ from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.search import search
 from weld_twin_core.diagnosis.many.fitted_together import fitted_together
 from weld_twin_core.diagnosis.many.small_errors import many_small
-from weld_twin_core.effects import REGISTRY, LinkTwist, MeasurementScale, TransmissionRipple
+from weld_twin_core.effects import (
+    REGISTRY,
+    GearRatio,
+    LinkTwist,
+    MeasurementScale,
+    TransmissionRipple,
+)
 
 GEOMETRY = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
 MIDDLE = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
@@ -167,3 +173,18 @@ def test_one_wrong_scale_is_not_ten_wrong_links(robot):
     told = fitted_together(few, without, Beliefs(), lambda text: None)
     assert not told.dense
     assert [effect.name for effect in told.final.model.found] == ['measurement_scale']
+
+
+def test_a_wrong_gear_ratio_among_many_small_errors_is_no_ripple(robot):
+    """Sixty stations bear a ratio for every joint; a ripple stood in for the one that is wrong."""
+    rng = np.random.default_rng(7)
+    kinds = [REGISTRY[name] for name in GEOMETRY if name != 'axis_parallelism']
+    joints = robot.joint_names[1:-1]
+    small = [kind(joint, 3e-4 * rng.standard_normal()) for kind in kinds for joint in joints]
+    seen = stations(robot, 0.9, [GearRatio('wrist_1_joint', 4e-3), *small], count=60)
+    problem, start = aligned([seen], robot, 'base,tool', ())
+    few = search(problem, start, (), Beliefs(), lambda text: None)
+    many = fitted_together(few, (), Beliefs(), lambda text: None)
+    ratios = {e.site: e.scale for e in many.final.model.found if e.name == 'gear_ratio'}
+    assert ratios.pop('wrist_1_joint') == pytest.approx(4e-3, abs=5e-4)
+    assert max(abs(other) for other in ratios.values()) < 5e-4

@@ -196,6 +196,8 @@ class Family:
     take off together."""
     named: bool = False
     """Whether the verdict names it; one that it does not is exchangeable here."""
+    alike: tuple[tuple[Site, ...], ...] = ()
+    """Which of the members needed are one error everywhere, and share what it does evenly."""
 
     @property
     def growth(self) -> float:

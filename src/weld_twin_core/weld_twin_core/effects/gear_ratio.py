@@ -51,7 +51,7 @@ class GearRatio(LinearEffect):
         meaning='a joint turns by a constant factor too far',
         entered='ratio',
         depends_on='angle',
-        demand=2,
+        demand=1,
         by_motion=True,
         everywhere=True,
     )

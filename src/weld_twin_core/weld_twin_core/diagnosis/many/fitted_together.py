@@ -60,7 +60,7 @@ def fitted_together(
     progress('many small errors at once: fitting them together')
     best, remaining = result, np.inf
     for less in _steps(result.problem, stations):
-        trial = _together(result, (*exclude, *less), beliefs, progress)
+        trial = _together(result, exclude, less, beliefs, progress)
         remains = unseen_rms(trial)
         if remains < beliefs.better * remaining:
             best, remaining = trial, remains
@@ -117,15 +117,21 @@ def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
 def _together(
     result: Search,
     exclude: Sequence[str],
+    less: Sequence[str],
     beliefs: Beliefs,
     progress: Callable[[str], None],
 ) -> Search:
-    """Return the fit of all families but some, and but those that no machine has so large."""
+    """
+    Return the fit of all families but some, and but those that no machine has so large.
+
+    less: kinds of which only those are fitted along that were found one by one.
+    """
     refused = list(result.refused)
     while True:
         model = result.small.model
         kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-        final, scale, precision = many_small(result.problem, kept, exclude, beliefs, progress)
+        left_out = (*exclude, *less)
+        final, scale, precision = many_small(result.problem, kept, left_out, beliefs, progress)
         robot = final.model.robot
         absurd = [effect for effect in final.model.found if _too_large(robot, effect)]
         if not absurd:

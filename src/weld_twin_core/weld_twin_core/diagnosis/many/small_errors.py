@@ -76,15 +76,20 @@ def many_small(
 def _everything(
     problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Effect, ...]:
-    """Return every effect that fits linearly, at zero unless the search has found its value."""
+    """
+    Return every effect that fits linearly, at zero unless the search has found its value.
+
+    Of other kinds those that the search has found.
+    """
     features = problem.features(model)
     have = {effect.key: effect for effect in model.found}
     # All joints' pairs of coordinates together stay below half the rows.
     most = problem.size // (4 * model.robot.n)
     out: list[Effect] = []
     small: Sequence[Effect]
-    for kind in candidate_kinds(exclude, problem.align):
-        if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.traits.common:
+    for kind in candidate_kinds((), problem.align):
+        alike = kind.traits.common and kind.stage not in (Stage.SERVO, Stage.CLOCK)
+        if kind.name in exclude or not alike:
             # Postures visited in an order look like a creep, which goes on where the arm does not.
             if kind.traits.depends_on != 'time':
                 out += [e for e in model.found if e.name == kind.name]

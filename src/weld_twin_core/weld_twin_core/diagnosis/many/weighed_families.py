@@ -5,9 +5,10 @@ Which kinds of error unseen data need, of all kinds fitted together, and on whic
 
 All kinds at once predict well, and hardly one of them is missed: the others take its place. So
 kinds are added one after the other, each as large as machines have it, and the one that leaves
-least on unseen data first, until no other takes a tenth off. Each is then taken out of what was
-chosen, with all others and the frames fitted anew: a kind is needed where unseen data get worse.
-What would do as well in its place is told beside it.
+least on unseen data first, until no other takes a tenth off. A kind that not every arm has is one of
+them only where unseen data get worse without it beside all that every arm has. Each is then taken
+out of what was chosen, with all others and the frames fitted anew: a kind is needed where unseen
+data get worse. What would do as well in its place is told beside it.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
+from ..hypotheses.any_motion import same_error
 from ..hypotheses.search import Search
 from ..result import Family, Site
 from ..unseen.folds import STRETCHES
@@ -65,6 +68,8 @@ class _Case:
     of every sample, those of all views one after the other.
     """
 
+    robot: Robot
+    align: frozenset[str]
     effects: tuple[Effect, ...]
     views: tuple[Unseen, ...]
     parts: NDArray[np.intp]
@@ -85,7 +90,8 @@ class _Case:
             # Of eight parts two neighbours together tell more steadily.
             parts.append(first + (own // 2 if names.size >= STRETCHES else own))
             first = int(parts[-1].max()) + 1
-        return cls(model.found, tuple(views), np.concatenate(parts), worth)
+        where = model.robot, result.problem.align
+        return cls(*where, model.found, tuple(views), np.concatenate(parts), worth)
 
     @cached_property
     def sites(self) -> list[Site]:
@@ -145,7 +151,8 @@ class _Case:
     def chosen(self) -> list[str]:
         """Return the kinds that unseen data need together, added one by one, and held to it."""
         out: list[str] = []
-        while len(out) < len(self.members) and (best := self._next(out)) is not None:
+        open_to = [name for name in self.members if self._in_every_arm(name) or self._beyond(name)]
+        while len(out) < len(open_to) and (best := self._next(out, open_to)) is not None:
             out.append(best)
         while out:
             every = self.of_kinds(out)
@@ -155,7 +162,15 @@ class _Case:
             del out[int(np.argmin(losses))]
         return out
 
-    def _next(self, chosen: Sequence[str]) -> str | None:
+    def _in_every_arm(self, name: str) -> bool:
+        return self.effects[self.members[name][0]].traits.common
+
+    def _beyond(self, name: str) -> bool:
+        """Return whether unseen data need a kind beside all others together."""
+        every = self.of_kinds(self.members)
+        return self._loss(every, self.of_kinds(self.members, but=name)) >= self.worth
+
+    def _next(self, chosen: Sequence[str], open_to: Sequence[str]) -> str | None:
         """
         Return the kind that takes most off unseen data beside those chosen, if one takes enough.
 
@@ -163,7 +178,7 @@ class _Case:
         of many kinds; they are chosen where no kind does nearly as much.
         """
         now, order = self.of_kinds(chosen), []
-        for name in self.members:
+        for name in open_to:
             if name not in chosen:
                 fall = self.growth([*now, *self.members[name]], now)
                 median = float(np.median(fall))
@@ -198,21 +213,51 @@ class _Case:
                     like.append((part, instead))
         like = sorted(like, key=lambda item: -item[0])[:MOST_LIKE]
         reported = tuple((self._largest(others, instead), part) for part, instead in like)
-        return replace(out, needed=self._needed(others, own), like=reported)
+        needed, alike = self._needed(others, own)
+        return replace(out, needed=needed, alike=alike, like=reported)
 
-    def _needed(self, others: Sequence[int], own: Sequence[int]) -> tuple[tuple[Site, float], ...]:
-        """Return the members of a kind that are missed, each with its share, largest first."""
+    def _needed(
+        self, others: Sequence[int], own: Sequence[int]
+    ) -> tuple[tuple[tuple[Site, float], ...], tuple[tuple[Site, ...], ...]]:
+        """
+        Return the members of a kind that are missed, each with its share, largest first.
+
+        Those that are one error are missed together; they are returned beside them.
+        """
         if len(own) == 1:
-            return ((self.sites[own[0]], 1.0),)
+            return ((self.sites[own[0]], 1.0),), ()
         every = [*others, *own]
-        missed = np.array([self._loss(every, [k for k in every if k != one]) for one in own])
+        groups = self._alike(own)
+        missed = np.array([self._loss(every, [k for k in every if k not in g]) for g in groups])
         missed = np.maximum(missed, 0.0)
         if missed.sum() <= 0.0:
             # Each takes the place of another: the one that does most by itself stands for them.
-            return ((self._largest(others, own), 1.0),)
+            return ((self._largest(others, own), 1.0),), ()
         shares = missed / missed.sum()
-        ordered = np.argsort(-shares, kind='stable')
-        return tuple((self.sites[own[k]], float(shares[k])) for k in ordered if shares[k] > 0.0)
+        ordered = [int(g) for g in np.argsort(-shares, kind='stable') if shares[g] > 0.0]
+        needed = [
+            (self.sites[k], float(shares[g]) / len(groups[g])) for g in ordered for k in groups[g]
+        ]
+        alike = [tuple(self.sites[k] for k in groups[g]) for g in ordered if len(groups[g]) > 1]
+        return tuple(needed), tuple(alike)
+
+    def _alike(self, own: Sequence[int]) -> list[list[int]]:
+        """Return members of a kind in groups of those that are one and the same error everywhere."""
+        out: list[list[int]] = []
+        for k in own:
+            for group in out:
+                if self._same(group[0], k):
+                    group.append(k)
+                    break
+            else:
+                out.append([k])
+        return out
+
+    def _same(self, one: int, other: int) -> bool:
+        first, second = self.effects[one], self.effects[other]
+        if first.traits.depends_on != 'constant':
+            return False
+        return same_error(self.robot, first, second, self.align, both=True)
 
     def _largest(self, others: Sequence[int], own: Sequence[int]) -> Site:
         """Return the member of a kind that does most by itself."""

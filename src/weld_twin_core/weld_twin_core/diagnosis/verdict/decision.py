@@ -24,10 +24,6 @@ LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
 TINY = 1e-18
 """Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
-_MANY_IMITATE = (
-    'many small errors together fit best, but leave so much that they rather imitate a cause that '
-    'is not in the library'
-)
 _FOREIGN = (
     'where the evidence was like this, a cause that is not in the library was at work more often '
     'than not, and what was found stood in for a part of it'
@@ -232,8 +228,6 @@ def _of_families(remaining: Left) -> Verdict:
     whole = Verdict('identified', sets, (reason,), tuple(families))
     if not sets:
         return replace(whole, status='unknown', reasons=(reason, _NO_KIND))
-    if not all(p > LIKELIER for p in remaining.evidence.believed):
-        return replace(whole, status='unknown', reasons=(_MANY_IMITATE,))
     if remaining.explained <= remaining.share:
         return replace(whole, status='unknown')
     alone = all(len(group) == 1 for group in sets)
@@ -241,9 +235,17 @@ def _of_families(remaining: Left) -> Verdict:
 
 
 def _sets_of(family: Family) -> list[tuple[Site, ...]]:
-    """Return a set for every joint of a kind; what would do as well as the kind is in the first."""
+    """
+    Return a set for every joint of a kind, or for joints that are alike.
+
+    What would do as well as the kind is in the first.
+    """
+    groups = dict.fromkeys(
+        next((group for group in family.alike if site in group), (site,))
+        for site, _ in family.needed
+    )
     like = [site for site, _ in family.like]
-    return [(site, *(like if k == 0 else ())) for k, (site, _) in enumerate(family.needed)]
+    return [(*group, *(like if k == 0 else ())) for k, group in enumerate(groups)]
 
 
 def _no_noise(evidence: Evidence) -> list[str]:

@@ -16,6 +16,9 @@ from weld_twin_core.diagnosis.result import NAMING
 
 from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
+from .there import HALF
+from .there import complete as nothing_missing
+from .there import right as right_everywhere
 from .whole import FEW, whole
 
 AS_WELL = 0.05
@@ -95,6 +98,8 @@ def _right(row: Mapping[str, Any], judgement: Judged) -> bool:
 
     Of two or three causes those that do not show may be missing, as of four to six.
     """
+    if 'there' in row:
+        return right_everywhere(row)
     right = judgement.right
     if 'shown' in row['truth'] and not (right and judgement.kind in FEW):
         right = whole(row['truth'], row['verdict']).right
@@ -183,6 +188,7 @@ def _examples(
     truths = levels_of(row['truth'])
     named_right = whole_right and row['verdict']['status'] in NAMING
     nameless = row['truth']['kind'] in NOT_IN_LIBRARY and not named_right
+    parts = row.get('there')
     for said in row['statements']:
         kind, reported = said['kind'], said['probability']
         if said['cause'] is None:
@@ -191,12 +197,19 @@ def _examples(
             yield kind, said['features'], right, reported, sure
             continue
         cause, level = causes[said['cause']], kind.split()[0]
+        part = parts[said['cause']] if parts is not None else None
+        if parts is not None and part is None:
+            continue
         named = any((n['effect'], n['joint']) in at_work for n in cause['name'])
+        if part is not None:
+            named = part['name'] >= HALF
         if level == 'name':
             right = named
         elif not cause[level] or (named and kind in ('place', 'dependence')):
             # Those of a right name are right; what is learned of them holds where it is wrong.
             continue
+        elif part is not None:
+            right = named or part[level] >= HALF
         else:
             first = cause[level][0]['at' if level == 'place' else 'on']
             right = any(first in own[level == 'dependence'] for own in truths)
@@ -206,6 +219,8 @@ def _examples(
 
 def _complete(row: Mapping[str, Any]) -> bool:
     """Return whether no cause above the noise and a tenth of the squared gap is missing."""
+    if 'there' in row:
+        return nothing_missing(row)
     truth, named = row['truth'], set[tuple[str, str | None]]()
     for cause in row['verdict']['causes']:
         if not cause['rest']:

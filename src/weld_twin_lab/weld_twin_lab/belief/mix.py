@@ -6,8 +6,9 @@ The mixes of cases that belief is learned from, and that its bounds hold for.
 In the usual one robots, kinds of causes, their sizes and the kinds of motion are those of the blind
 check, with a quarter of the cases outside the library or withheld from it; a third of the motions is
 poor. The other has cells with one to six causes at once, as real cells have them: every number is
-equally often, and in a fifth of the cases the family of one cause is taken out of the library. The
-plant's statics are true: a spring settles where it balances the load.
+equally often, and in a fifth of the cases the family of one cause is taken out of the library. The third
+has arms that are off by a little everywhere, as every arm is, mostly at stations, with none to two
+causes besides. The plant's statics are true: a spring settles where it balances the load.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blind.ambiguous import CONSTRUCTIONS
-from ..blind.cause_sizes import FAMILIES, MOVING
+from ..blind.cause_sizes import FAMILIES, MOVING, Cause, site
 from ..blind.deck import KINDS, ROBOTS, Deck, Lot, lots
+from ..blind.everywhere import uneven_errors
 from ..blind.making import SealedCase, draw_case
 from ..blind.poor_motion import WAYS, poorer
 
-USUAL, SEVERAL = 'usual', 'several'
+USUAL, SEVERAL, EVERYWHERE = 'usual', 'several', 'everywhere'
 """Mixes of cases."""
 SHARES = {**KINDS, 'outside': 6, 'withheld': 6}
 """Of 44 usual cases, how many are of each kind."""
@@ -63,12 +65,20 @@ HELD_OUT = 3
 """One case of so many brings a held-out recording; of stations it has few."""
 
 
+PART = (0.05, 1.0)
+"""Small errors of an arm that is off everywhere, in parts of what machines have; even logarithms."""
+AT_REST = 0.7
+"""Share of these arms that are measured at stations."""
+
+
 class Drawn(NamedTuple):
     """A case, how its motion was made poor, and whether its held-out recording is given."""
 
     case: SealedCase
     poor: str = ''
     held_out: bool = True
+    small: tuple[Cause, ...] = ()
+    """Small errors everywhere, besides its causes."""
 
 
 def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
@@ -79,6 +89,8 @@ def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
     """
     if mix == SEVERAL:
         return _of_several(seed, number)
+    if mix == EVERYWHERE:
+        return _of_everywhere(seed, number)
     lot = mixed(seed, number + 1)[number]
     ways = Deck(POOR, seed, 60)
     poor = [ways.next() for _ in range(number + 1)][number]
@@ -102,6 +114,27 @@ def _of_several(seed: int, number: int) -> Drawn:
         case = replace(case, excluded=(str(rng.choice(lot.families)),))
     given = number % HELD_OUT == HELD_OUT - 1 and not case.also
     return Drawn(replace(case, holdout=holdout), held_out=given)
+
+
+def _of_everywhere(seed: int, number: int) -> Drawn:
+    rng = np.random.default_rng([seed, 4000 + number])
+    align = ALIGN[int(rng.integers(len(ALIGN)))]
+    cards = [name for name in COMMON if name not in {f'{frame}_pose' for frame in align}]
+    causes = tuple(map(str, rng.choice(cards, int(rng.integers(3)), replace=False)))
+    lot = Lot(
+        'several' if causes else 'none',
+        ROBOTS[number % len(ROBOTS)],
+        'stations' if rng.random() < AT_REST else 'free',
+        causes,
+        tuple(int(rng.choice(STRATA)) for _ in causes),
+        align,
+        float(np.exp(rng.uniform(*np.log(NOISE)))),
+    )
+    case = draw_case(lot, rng, SPANS)
+    there = {site(cause) for cause in case.causes}
+    part = float(np.exp(rng.uniform(*np.log(PART))))
+    small = [own for own in uneven_errors(case.cell.robot, rng, part) if site(own) not in there]
+    return Drawn(case, held_out=False, small=tuple(small))
 
 
 def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:

@@ -60,5 +60,6 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def seeds_of(rows: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Return the seeds that cases were drawn from."""
-    return sorted({int(row['name'].partition('/')[0]) for row in rows})
+    """Return the seeds that cases were drawn from; a row of a real arm has none."""
+    seeds = {row['name'].partition('/')[0] for row in rows}
+    return sorted(int(seed) for seed in seeds if seed.isdecimal())

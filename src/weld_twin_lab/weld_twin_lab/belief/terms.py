@@ -39,6 +39,8 @@ NAMED = {
     **NAMES,
 }
 """What speaks for an answer that names causes; against it speaks that one of them has no name."""
+MANY = {'growth': 1, 'least growth': 1, 'size': 1, 'gap': 0, 'stations': 0, 'structure': -1}
+"""What speaks for a kind of many small errors."""
 REST = {'weight': 1, 'second': -1, 'share': 1, 'steady': 1, 'groups': 0}
 TERMS: dict[str, dict[str, int]] = {
     'name': {
@@ -72,9 +74,9 @@ TERMS: dict[str, dict[str, int]] = {
         'angle': 0,
         'wander': 0,
     },
-    'name of many': {'structure': -1, 'left': -1},
-    'place of many': {'structure': -1, 'left': -1},
-    'dependence of many': {'structure': -1, 'left': -1},
+    'name of many': {**MANY, 'others like it': 0, 'members': 0},
+    'place of many': {**MANY, 'members': 0},
+    'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},
     'dependence of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},
     'complete': {
@@ -99,7 +101,7 @@ TERMS: dict[str, dict[str, int]] = {
         **NAMES,
     },
     'answer, none': {'structure': -1, 'rows': 0, 'left': -1},
-    'answer, many': {'structure': -1, 'left': -1, 'gap': 0},
+    'answer, many': {'structure': -1, 'left': -1, 'gap': 0, 'names': 1, 'told': 0},
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""
 OF_FAMILIES = frozenset({'name', 'nameless'})

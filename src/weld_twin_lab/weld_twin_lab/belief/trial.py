@@ -18,11 +18,13 @@ from weld_twin_core.recording import Recording
 
 from ..blind import layout
 from ..blind.achieved import aligned_on, counted, gap_on
-from ..blind.blind_cell import Take, as_recording, record
+from ..blind.blind_cell import Take, as_recording, floor, record
+from ..blind.cause_sizes import Cause
 from ..blind.displacement import rms
 from ..blind.making import SealedCase, truth_of
 from ..study import engine_digest
-from .mix import SEVERAL, USUAL, drawn
+from .mix import EVERYWHERE, SEVERAL, USUAL, drawn
+from .there import there
 from .visible import shown
 from .whole import FEW
 
@@ -36,32 +38,42 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     """
     name = f'{seed}/{number}'
     try:
-        case, poor, held_out = drawn(seed, number, mix)
+        case, poor, held_out, small = drawn(seed, number, mix)
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
-    row = {'poor': poor, **row_of(name, case, held_out=held_out)}
-    if mix == SEVERAL or row['truth']['kind'] in FEW:
+    row = {'poor': poor, **row_of(name, case, held_out=held_out, small=small)}
+    if not small and (mix == SEVERAL or row['truth']['kind'] in FEW):
         row['truth']['shown'] = shown(case)
     return row
 
 
-def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, Any]:
+def row_of(
+    name: str, case: SealedCase, *, held_out: bool = True, small: Sequence[Cause] = ()
+) -> dict[str, Any]:
     """
     Return the row of a case.
 
     held_out: whether its held-out recording is given to the diagnosis.
+    small: errors everywhere besides its causes.
     """
     row: dict[str, Any] = {
         'name': name,
         'engine': engine_digest()[:16],
         'truth': truth_of(name, case),
     }
+    case = replace(case, causes=[*case.causes, *small])
     start = time.process_time()
     try:
         diagnosis = diagnosed(case, recordings_of(case), held_out=held_out)
     except Exception as error:
         return {**row, 'error': f'{type(error).__name__}: {error}'}
     row['seconds'] = time.process_time() - start
+    if small and diagnosis.status != 'unsound':
+        row['there'] = there(case, diagnosis)
+        row['truth']['kind'] = EVERYWHERE
+        row['truth']['floor_m'], row['truth']['outliers'] = floor(
+            case.cell, case.causes, case.test
+        )
     return {
         **row,
         'error': None,

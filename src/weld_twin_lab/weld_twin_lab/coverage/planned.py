@@ -12,7 +12,6 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.diagnosis.predicting import plausible_arm
 from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 from weld_twin_core.diagnosis.predicting.planned import (
     JUDGED,
@@ -23,7 +22,7 @@ from weld_twin_core.diagnosis.predicting.planned import (
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.posterior import expected_poses, largest_sigma
 
-from ..blind.cause_sizes import Cause
+from ..blind.everywhere import small_errors
 from ..plant.plant import run
 from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
@@ -85,21 +84,6 @@ def carried_out(seed: int) -> dict[str, Any]:
 
 def _still(name: str, q: Array) -> Recording:
     return Recording(name, JointMotion(np.arange(float(len(q))), q, static=True))
-
-
-def small_errors(robot: Robot, rng: np.random.Generator, part: float = 1.0) -> list[Cause]:
-    """Return every small error that arms of this kind have, each drawn from a part of its spread."""
-    out = []
-    for effect in plausible_arm.directions(robot, ()):
-        if effect.of not in ('joint', 'link') or effect.traits.waves is not None:
-            continue
-        size = plausible_arm.sizes(robot, effect) * rng.standard_normal(effect.vector().size)
-        if effect.name == 'joint_compliance':
-            if robot.mass is None:
-                continue
-            size = np.abs(size)
-        out.append(effect.with_vector(part * size).to_mapping())
-    return out
 
 
 def _measured(

@@ -34,11 +34,11 @@ from ..blind.achieved import NORMAL_90, TO_90, aligned_on, gap_on
 from ..blind.blind_cell import GROSS, as_recording, exact, record
 from ..blind.cause_sizes import Cause, site
 from ..blind.displacement import rms
+from ..blind.everywhere import small_errors
 from ..blind.making import SealedCase, one_arm
 from ..transfer.unseen import flagged
 from .held import held, twin_for, within
 from .oracle import oracle_sigma
-from .planned import small_errors
 
 PART = (0.005, 0.1)
 """Small errors, in parts of what machines have: a zero of 5 to 100 microradians, as an arm has it that
@@ -58,7 +58,7 @@ def of_case(seed: int, number: int) -> dict[str, Any] | None:
     seed, number: as `mix.drawn` takes them.
     """
     try:
-        case, poor, _ = drawn(seed, number)
+        case, poor, *_ = drawn(seed, number)
         case = one_arm(case)
     except DataError:
         return None

@@ -59,12 +59,38 @@ def judged(data: str, name: str) -> dict[str, Any]:
         for claim, (whole, beside) in zip(claims, borne, strict=True):
             claim |= {'against_all': _plain(whole), 'against_told': _plain(beside)}
     out['claims'] = claims
+    out['examples'] = _examples(diagnosis, out['causes'], claims)
     out['unseen_m'] = _unseen(one, diagnosis)
     pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
         both = [tried(half, one.robot, **options)[0] for half in pair]
         out['halves'] = [_said(half) if half is not None else None for half in both]
     return out
+
+
+def _examples(
+    diagnosis: Diagnosis, causes: Sequence[Mapping[str, Any]], claims: Sequence[Mapping[str, Any]]
+) -> list[list[Any]]:
+    """Return every statement that a kind of many small errors is there, for belief to be learned."""
+    out = []
+    for said in map(vars, diagnosis.statements):
+        if said['kind'] == 'name of many':
+            kinds = {kind for kind, _, _ in causes[said['cause']]['names']}
+            own = [claim for claim in claims if kinds.issuperset(claim['kinds'])]
+            if own:
+                right = any(_holds(claim, 'against_told') for claim in own)
+                sure = bool(causes[said['cause']]['sure'])
+                out.append([said['kind'], said['features'], right, said['probability'], sure])
+    return out
+
+
+def taught(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows as belief is learned from: of every row what was said, and whether it holds."""
+    return [
+        {'name': e['name'], 'error': None, 'mix': 'real arms', 'examples': e['examples']}
+        for e in entries
+        if e.get('examples')
+    ]
 
 
 def reported_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ..beliefs import Beliefs
-from ..result import NAMING, Cause
+from ..result import NAMING, Cause, Family
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence, Row
 from .features import (
     TOLD_AS,
     Numbers,
+    of_kind,
     of_level,
     of_name,
     of_rest,
@@ -24,11 +25,6 @@ from .features import (
 from .weights import Calibration, Features, usual_calibration
 
 Key = TypeVar('Key')
-KIND, KIND_AT = 0.69, 0.85
-"""Belief in the name of a kind of many small errors that unseen data need, and in its place and its
-dependence. Of 38 kinds told of 25 recordings of real arms least squares on stations that were not
-fitted bore out 34; of 36 told of sealed cells (seeds 81001 and 82001) 17 were right, with 30 places
-and 31 dependences: 51 of 74, and 61 of 72. Too few to learn more than a constant."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +47,14 @@ class Stated:
 
     table: tuple[Row, ...]
     names: tuple[Statement, ...]
-    """Of every effect found; of many small errors one for all that are named."""
+    """Of every effect found; none of many small errors."""
     nameless: Statement | None
     """That a cause without a name is at work; None of many small errors, and where nothing was
     found."""
     situation: Features
     """Features of the diagnosis as a whole."""
+    floor: float
+    """Noise [m]."""
 
     def put_to(self, evidence: Evidence) -> Evidence:
         """Return evidence with what is believed of the names, and that a cause has none."""
@@ -70,17 +68,17 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
     learned = usual_calibration()
     situation = of_situation(evidence, beliefs)
     if evidence.families is not None:
-        return Stated(table, (Statement('name of many', 0, situation, KIND),), None, situation)
+        return Stated(table, (), None, situation, evidence.floor)
     sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
     each = zip(table, sizes, evidence.wandered, strict=False)
     on = evidence.structure.depends_on
     every = [of_name(row, size, wandered, on) for row, size, wandered in each]
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
-        return Stated(table, (), None, situation)
+        return Stated(table, (), None, situation, evidence.floor)
     whole = of_whole([one.probability for one in names], [one.features for one in names])
     nameless = _told('nameless', None, {**situation, **whole}, learned)
-    return Stated(table, names, nameless, situation)
+    return Stated(table, names, nameless, situation, evidence.floor)
 
 
 def calibrated(
@@ -97,17 +95,23 @@ def calibrated(
     form: of what places what has no name, as `features.of_form` has it.
     """
     learned = usual_calibration()
+    families = {family.effect: family for family in verdict.families}
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
-        levels = _levels(k, cause, bool(verdict.families), before, form, learned)
+        levels = _levels(k, cause, families, before, form, learned)
         reported.append(_with(cause, [one.probability for one in levels], learned))
         said += levels
+    kinds = [one for one in said if one.kind == 'name of many']
     slots = [cause for cause in reported if cause.slot is not None]
     names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
     few = verdict.status in NAMING and not verdict.families
     named = {cause.slot for cause in slots}
     doubted = [one.probability for k, one in enumerate(before.names) if few and k not in named]
-    whole = of_whole([cause.probability for cause in slots], names, doubted)
+    whole = (
+        of_whole([one.probability for one in kinds], [one.features for one in kinds])
+        if kinds
+        else of_whole([cause.probability for cause in slots], names, doubted)
+    )
     whole = {**before.situation, **whole, **form}
     verdict, more = _of_answer(verdict, whole, learned)
     if verdict.sure and verdict.status in NAMING:
@@ -120,7 +124,7 @@ def calibrated(
 def _levels(
     k: int,
     cause: Cause,
-    many: bool,
+    families: Mapping[str, Family],
     before: Stated,
     form: Numbers,
     learned: Calibration,
@@ -132,9 +136,10 @@ def _levels(
         own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
-    if many and cause.effect is not None:
-        reported = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
-        return [Statement(f'{on} of many', k, dict(situation), p) for on, p in reported.items()]
+    if families and cause.effect is not None:
+        kind = of_kind(cause, families[cause.name[0][0].effect], before.floor)
+        each = (*both, 'name')
+        return [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]
     return [
         _told(f'{level} of the rest', k, more, learned)
@@ -171,8 +176,8 @@ def _with(cause: Cause, levels: Sequence[float], calibration: Calibration) -> Ca
         # The joints of a kind share what is believed of it, and so do others that are like it.
         levels_of = _scaled(cause.place, place), _scaled(cause.dependence, dependence)
         cause = replace(cause, place=levels_of[0], dependence=levels_of[1])
-        named = _scaled(cause.name, name[0])
-        return replace(cause, name=named, probability=name[0], sure=False)
+        named, sure = _scaled(cause.name, name[0]), calibration.sure('cause', name[0])
+        return replace(cause, name=named, probability=name[0], sure=sure)
     if cause.slot is not None:
         place, dependence = (name[0] + (1.0 - name[0]) * p for p in (place, dependence))
     reported = name[0] if name else place if cause.place else 0.0

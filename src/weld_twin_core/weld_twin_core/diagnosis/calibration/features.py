@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..beliefs import Beliefs
-from ..result import Cause
+from ..result import Cause, Family
 from ..verdict.decision import Left
 from ..verdict.evidence import Evidence, Row
 
@@ -32,9 +32,9 @@ KINDS = {
     'name': 'one of the names of an effect found is right',
     'place': 'its place is right although its name is not',
     'dependence': 'what it depends on is right although its name is not',
-    'name of many': 'the families named of many small errors are there',
-    'place of many': 'where they are is right',
-    'dependence of many': 'what they depend on is right',
+    'name of many': 'at least half of what a kind of many small errors is said to do is there',
+    'place of many': 'what is wrong at the places named does as much',
+    'dependence of many': 'what depends on the same does as much',
     'place of the rest': 'the place of what has no name is right',
     'dependence of the rest': 'what it depends on is right',
     'nameless': 'a cause is at work that has no name in the library, and what is named is wrong',
@@ -119,6 +119,24 @@ def of_rest(cause: Cause, level: str) -> Numbers:
             'weight': odds(first),
             'second': second,
             'share': cause.share,
+        }
+    )
+
+
+def of_kind(cause: Cause, family: Family, floor: float) -> Numbers:
+    """
+    Return the features of a kind of many small errors.
+
+    family: how unseen data get worse without it.
+    floor: noise [m].
+    """
+    return plain(
+        {
+            'growth': log1(family.growth),
+            'least growth': log1(min(family.growths, default=0.0)),
+            'size': log(family.rms_m / max(floor, 1e-12)),
+            'members': len(cause.name),
+            'others like it': float(bool(family.like)),
         }
     )
 

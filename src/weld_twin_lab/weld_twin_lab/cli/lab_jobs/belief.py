@@ -25,7 +25,7 @@ OPTIONS = options(
 --seed N                their seed [default: 1]
 --held-out N            cases to judge on [default: 0]
 --held-out-seed N       their seed [default: 2]
---mix {{usual,several}}   cases of the usual mix, or cells with one to six causes [default: usual]
+--mix {{usual,several,everywhere}}  which cells: see docs/trust.md [default: usual]
 --oracle N              of so many of these an oracle that knows the plant is asked, too [default: 0]
 --learn-from TABLE ...  tables kept from other runs
 --judge-on TABLE ...    tables kept from other runs

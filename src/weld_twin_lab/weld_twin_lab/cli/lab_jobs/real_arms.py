@@ -3,8 +3,8 @@
 """Real arms that nobody tuned on: which causes are told, and do unseen data bear them out?
 
 Diagnoses some sixty parts of third-party recordings, and takes every kind that is told out of a plain
-fit of all kinds: unseen data must get worse. Writes real_arms.json and real_arms.md. Stopped, it
-goes on where it was when run again.
+fit of all kinds: unseen data must get worse. Writes real_arms.json, real_arms.md and told.jsonl, a
+table that 'lab belief --learn-from' takes. Stopped, it goes on where it was when run again.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ def run(study: Study) -> None:
     from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.task_pool import Task
 
+    from ...belief.rows import write_rows
     from ...real_arms.rows import plans
-    from ...real_arms.study import judged, summary, table
+    from ...real_arms.study import judged, summary, table, taught
 
     data = Path(study.args.data)
     if not data.is_dir():
@@ -38,3 +39,4 @@ def run(study: Study) -> None:
     tasks = [Task(judged, (str(data), name), name) for name in names]
     entries = study.tasks(tasks, 'diagnosing')
     study.write('real_arms', {'summary': summary(entries), 'rows': entries}, table(entries))
+    write_rows(study.out / 'told.jsonl', taught(entries))

@@ -1,0 +1,52 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Arms that are off by a little everywhere: what is said of a kind of error is there, or is not."""
+
+from dataclasses import replace
+
+import pytest
+
+from weld_twin_lab.belief.judged import kept
+from weld_twin_lab.belief.mix import EVERYWHERE, drawn
+from weld_twin_lab.belief.there import HALF, there
+from weld_twin_lab.belief.trial import diagnosed, recordings_of, tried
+from weld_twin_lab.blind.cause_sizes import site
+
+pytest.importorskip('mujoco')
+SEED, NUMBER = 900003, 1
+
+
+@pytest.fixture(scope='module')
+def seen():
+    """Return an arm with errors everywhere, measured at stations, and what is found of it."""
+    case, *_, small = drawn(SEED, NUMBER, EVERYWHERE)
+    case = replace(case, causes=[*case.causes, *small])
+    return case, diagnosed(case, recordings_of(case))
+
+
+def test_small_errors_stand_at_every_joint(seen):
+    case, _ = seen
+    joints = set(case.cell.robot.joint_names)
+    for kind in ('joint_offset', 'link_length', 'link_twist', 'transmission_ripple'):
+        assert {joint for name, joint in map(site, case.causes) if name == kind} == joints
+
+
+def test_what_is_said_of_the_largest_kinds_is_there(seen):
+    case, found = seen
+    parts = there(case, found)
+    assert len(parts) >= 3
+    assert all(0.8 < part['name'] < 1.2 for part in parts[:3])
+
+
+def test_nothing_of_a_kind_is_there_once_it_is_taken_out_of_the_arm(seen):
+    case, found = seen
+    kind = found.causes[0].name[0][0].effect
+    rest = [cause for cause in case.causes if cause['effect'] != kind]
+    assert there(replace(case, causes=rest), found)[0]['name'] < HALF
+
+
+def test_a_row_keeps_a_statement_for_every_kind():
+    row = kept(tried(SEED, NUMBER, EVERYWHERE))
+    names = [right for kind, _, right, *_ in row['examples'] if kind == 'name of many']
+    assert len(names) >= 3
+    assert row['kind'] == EVERYWHERE

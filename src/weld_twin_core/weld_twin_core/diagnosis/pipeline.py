@@ -150,6 +150,9 @@ def _explained(
     result = search(*examined.posed, exclude, beliefs, progress)
     result = fitted_together(result, exclude, beliefs, progress)
     result = settled_between(result, examined.given.may_change, beliefs)
+    examined = _without_slips(result, examined, exclude, beliefs, progress)
+    if examined.posed is None:
+        return refusal(examined)
     out = _told(result, examined, holdout, beliefs, limits, progress)
     # Or is it likelier than not that no name is right?
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
@@ -158,6 +161,22 @@ def _explained(
     progress('a few effects leave the cause unknown: all kinds together')
     many = _told(result.many, examined, holdout, beliefs, limits, progress)
     return many if _named(many) else out
+
+
+def _without_slips(
+    result: Search,
+    examined: Examined,
+    exclude: Sequence[str],
+    beliefs: Beliefs,
+    progress: Progress,
+) -> Examined:
+    """Return what was examined, unsound where something gave way that no effect explains."""
+    out = examined.refusing_slips(result.problem, result.final.model)
+    if out.posed is None and exclude and examined.posed is not None:
+        # What was taken out of the library may be what looks like a slip.
+        whole = search(*examined.posed, (), beliefs, progress)
+        out = examined.refusing_slips(whole.problem, whole.final.model)
+    return out
 
 
 def _named(out: Diagnosis) -> bool:
@@ -174,9 +193,6 @@ def _told(
     progress: Progress,
 ) -> Diagnosis:
     """Return the diagnosis of what was found."""
-    examined = examined.refusing_slips(result.problem, result.final.model)
-    if examined.posed is None:
-        return refusal(examined)
     holdout = examined.mended(holdout)
     result = borne_out(result, holdout, beliefs)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)

@@ -107,5 +107,5 @@ __all__ = [
     'register',
 ]
 
-for _file in iter_modules(__path__):  # an effect needs no line above to be known by its name
+for _file in iter_modules(__path__):  # a line above only makes a class importable from here
     import_module(f'.{_file.name}', __name__)

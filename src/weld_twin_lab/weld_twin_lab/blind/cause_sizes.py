@@ -247,6 +247,7 @@ def _usual(kind: type[Effect]) -> Typical:
         lambda robot, span, rng: {**({'joint': _joint(robot, rng)} if on_joint else {}), **sizes},
         (first.name,),
         signed=first.lower < 0.0,
+        moving='velocity' in kind.needs,
     )
 
 

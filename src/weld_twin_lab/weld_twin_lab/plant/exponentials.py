@@ -68,7 +68,7 @@ class Home:
 
 
 def arm_from(robot: Entry) -> Arm:
-    """Read the geometry of a robot file (interface section 2)."""
+    """Read the geometry of a robot file, as docs/conventions.md has it."""
     convention = robot.get('convention', 'standard')
     if convention not in ('standard', 'modified'):
         raise ValueError(f'convention must be standard or modified, got {convention!r}')

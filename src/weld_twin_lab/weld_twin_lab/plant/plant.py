@@ -150,7 +150,7 @@ def run(
     """
     Move a robot with flaws and record it.
 
-    robot: a robot file (interface section 2).
+    robot: a robot file, as docs/conventions.md has it.
     effects: the flaws, as in an effects file; also those of `outside_causes`.
     rng: source of everything random; the same seed gives the same recording.
     richness: how far the physics of servo, gap, spring and flywheel goes beyond the textbook form

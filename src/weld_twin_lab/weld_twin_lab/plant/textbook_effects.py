@@ -3,7 +3,7 @@
 """
 Effects that have a closed form: geometry as built, gearing, frames, the instrument.
 
-The names and parameters are those of the interface (section 3). Effects that need physics are in
+The names and parameters are those of docs/effects.md. Effects that need physics are in
 `drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
 payload), in `lost_motion` (friction, hysteresis, gear_ratio_by_direction), in `pedestal`, `hose` and
 `line_of_sight` (pedestal_tilt, hose_pull, refraction); causes that no library knows are in

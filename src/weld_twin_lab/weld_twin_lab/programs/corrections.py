@@ -24,7 +24,8 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.rotation import angle_between, rotation_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects import REGISTRY, effects_from_list
+from weld_twin_core.effects.effect import MemoryEffect
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.motion.programs import Piece
 from weld_twin_core.recording import JointMotion
@@ -43,15 +44,7 @@ from .plain_controller import REST, Driven, driven, evenly
 from .sealed_seams import MEASURING, SealedSeam, drawn_as, sealed_seam
 
 MEMORY = frozenset(
-    {
-        'backlash',
-        'loaded_play',
-        'friction',
-        'hysteresis',
-        'gear_ratio_by_direction',
-        'servo_lag',
-        'vibration',
-    }
+    {name for name, kind in REGISTRY.items() if issubclass(kind, MemoryEffect)} | {'loaded_play'}
 )
 """Causes whose effect hangs on where the arm came from."""
 UNCHANGED = 'nothing was found that a program mends'

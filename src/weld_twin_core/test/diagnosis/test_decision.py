@@ -158,14 +158,26 @@ def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named(pa
         assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
 
 
-@pytest.mark.parametrize(('joint', 'sets'), [(ELBOW, ((OFFSET,),)), (WRIST, ((PLAY,), (OFFSET,)))])
-def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motion(joint, sets):
+@pytest.mark.parametrize(
+    ('joint', 'after', 'sets', 'status'),
+    [
+        (ELBOW, 0.8e-3, ((OFFSET,),), 'unknown'),
+        (WRIST, 0.8e-3, ((PLAY,), (OFFSET,)), 'unknown'),
+        (WRIST, 0.2e-3, ((PLAY,), (OFFSET,)), 'identified'),
+    ],
+)
+def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motion(
+    joint, after, sets, status
+):
+    """It leaves the cause unknown where it is more of the gap than what is named."""
     both = SURE, slot((OFFSET, 1.0))
-    verdict = decide(evidence(*both, scattered=(Scatter(joint, 0.79, 13.0),)))
-    assert (verdict.status, verdict.sets) == ('unknown', sets)
-    assert verdict.reasons == (
-        f'what remains is no noise of the instrument: 79 % of it lies along the motion of {joint}',
+    noisy = Scatter(joint, 0.79, 13.0)
+    verdict = decide(evidence(*both, gap=1e-3, after=after, floor=1e-4, scattered=(noisy,)))
+    assert (verdict.status, verdict.sets) == (status, sets)
+    reason = (
+        f'what remains is no noise of the instrument: 79 % of it lies along the motion of {joint}'
     )
+    assert (reason in verdict.reasons) is (status == 'unknown')
     # The same where nothing was found.
     verdict = decide(evidence(gap=FLOOR, scattered=(Scatter(joint, 0.2, 6.0),)))
     assert (verdict.status, verdict.sets) == ('unknown', ())
@@ -378,6 +390,9 @@ def test_joints_at_which_a_kind_is_one_error_are_one_set():
     needed = (*((site, 0.4) for site in parallel), (Site('link_offset', ELBOW), 0.2))
     offsets = replace(family('link_offset'), needed=needed, alike=(parallel,))
     assert of_families(offsets).sets == (parallel, (Site('link_offset', ELBOW),))
+    # Together they count, though each by itself has less than a joint of its own would need.
+    needed = (*((site, 0.06) for site in parallel), (Site('link_offset', ELBOW), 0.88))
+    assert parallel in of_families(replace(offsets, needed=needed)).sets
 
 
 # The beliefs themselves -------------------------------------------------------------------------

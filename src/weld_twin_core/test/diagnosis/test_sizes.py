@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, hidden, weighed
 
@@ -12,7 +13,7 @@ SMALL = 40
 """Coordinates of one family."""
 
 
-def arm(seed, truth):
+def arm(seed, truth, frame_width=1e3):
     """Return rows of an arm whose small errors are given, and one error that a frame hides."""
     rng = np.random.default_rng(seed)
     frame, own = rng.normal(size=(1, 300)), rng.normal(size=(SMALL, 300))
@@ -20,7 +21,7 @@ def arm(seed, truth):
     residual = truth @ columns[1 : 1 + SMALL] + rng.normal(size=300)
     zero = np.zeros(SMALL + 2)
     group = np.array([-1, *[0] * SMALL, 0])
-    prior = Prior(zero, np.array([1e3, *[5.0] * (SMALL + 1)]), group, np.array([False]))
+    prior = Prior(zero, np.array([frame_width, *[5.0] * (SMALL + 1)]), group, np.array([False]))
     return weighed(Rows(columns, residual, 1.0), prior, 1.0)
 
 
@@ -31,9 +32,13 @@ def test_an_arm_with_next_to_no_errors_is_known_better_than_by_least_squares():
     assert np.abs(known.mean[1:]).max() < 0.1
 
 
-def test_errors_that_are_there_are_not_drawn_back():
-    truth = np.where(np.arange(SMALL) % 8 == 0, 4.0, 0.0)
-    known = arm(2, truth)
+@pytest.mark.parametrize(
+    ('frame_width', 'every', 'rest'), [(1e3, 8, 0.0), (1e5, 2, 0.02), (1e7, 2, 0.02)]
+)
+def test_errors_that_are_there_are_not_drawn_back(frame_width, every, rest):
+    """Whatever the frames' information is, beside which that of an error is rounding."""
+    truth = np.where(np.arange(SMALL) % every == 0, 4.0, rest)
+    known = arm(2, truth, frame_width)
     off = (known.mean[1 : 1 + SMALL] - truth) / np.sqrt(np.diag(known.covariance))[1 : 1 + SMALL]
     assert np.abs(off).max() < 4.0 and np.sqrt((off**2).mean()) < 1.3
 

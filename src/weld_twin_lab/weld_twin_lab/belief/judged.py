@@ -191,6 +191,8 @@ def _examples(
     parts = row.get('there')
     for said in row['statements']:
         kind, reported = said['kind'], said['probability']
+        if parts is not None and not kind.endswith('many'):
+            continue  # Every name is at work there, and is right by another event.
         if said['cause'] is None:
             right = {'complete': _complete(row), 'nameless': nameless}.get(kind, whole_right)
             sure = kind.startswith('answer') and bool(row['verdict']['sure'])

@@ -136,10 +136,8 @@ def _rounded(bound: Bound) -> dict[str, Any]:
 
 
 def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
-    places = {
-        case: k % FOLDS
-        for k, case in enumerate(sorted({e.case for e in examples}, key=_scattered))
-    }
+    together = sorted({_together(e.case) for e in examples}, key=_scattered)
+    places = {case: k % FOLDS for k, case in enumerate(together)}
     values = [
         [e.features.get(name, 0.0 if name.startswith(ONLY) else np.nan) for name in names]
         for e in examples
@@ -148,8 +146,13 @@ def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
         np.array(values, float).reshape(len(examples), len(names)),
         np.array([e.right for e in examples], bool),
         np.array([e.weight for e in examples], float),
-        np.array([places[e.case] for e in examples], int),
+        np.array([places[_together(e.case)] for e in examples], int),
     )
+
+
+def _together(case: str) -> str:
+    """Return what is unseen together: a sealed case, or all rows of one real arm."""
+    return case if '/' in case else case.split()[0]
 
 
 def _scattered(case: str) -> str:

@@ -166,9 +166,9 @@ class _Case:
         return self.effects[self.members[name][0]].traits.common
 
     def _beyond(self, name: str) -> bool:
-        """Return whether unseen data need a kind beside all others together."""
-        every = self.of_kinds(self.members)
-        return self._loss(every, self.of_kinds(self.members, but=name)) >= self.worth
+        """Return whether unseen data need a kind beside all that every arm has."""
+        usual = self.of_kinds(other for other in self.members if self._in_every_arm(other))
+        return self._loss([*usual, *self.members[name]], usual) >= self.worth
 
     def _next(self, chosen: Sequence[str], open_to: Sequence[str]) -> str | None:
         """

@@ -141,9 +141,9 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
 
 def with_prior(information: Array) -> Array:
     """Return the data's information with a prior of unit width added, in its place."""
-    # Rounding of the largest entries must not outweigh the prior in open directions.
-    jitter = 1.0 + 1e-14 * float(np.trace(information))
-    information[np.diag_indices_from(information)] += jitter
+    diagonal = np.diag_indices_from(information)
+    # Each by its own rounding: that of the largest entry would outweigh the prior of the others.
+    information[diagonal] = information[diagonal] * (1.0 + 1e-14) + 1.0
     return information
 
 

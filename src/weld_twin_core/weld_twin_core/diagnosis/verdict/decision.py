@@ -104,6 +104,12 @@ class Left:
         return float(np.clip(max(structured, over) / self._excess, 0.0, 1.0))
 
     @property
+    def scattered(self) -> float:
+        """Return what noise that comes from joints is of the squared gap above noise."""
+        part = sum(one.share for one in self.evidence.scattered)
+        return float(np.clip(part * self.evidence.after**2 / self._excess, 0.0, 1.0))
+
+    @property
     def explained(self) -> float:
         """Return the share of the squared gap above noise that the model takes off unseen data."""
         evidence = self.evidence
@@ -130,8 +136,9 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     ]
     named = remaining.explained * _share_of(likely, evidence)
     more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
+    more += remaining.scattered
     reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
-    if named <= more or evidence.nameless > LIKELIER or evidence.scattered:
+    if named <= more or evidence.nameless > LIKELIER:
         return Verdict('unknown', reported, _why_unknown(remaining, sets, likely))
     reasons = tuple(
         f'{", ".join(map(str, group))} move the tool alike on these data: their fits differ by less '
@@ -211,10 +218,12 @@ def _of_families(remaining: Left) -> Verdict:
     for reported in remaining.evidence.families or ():
         members = tuple(item for item in reported.members if item[1] > beliefs.member_least_m)
         if members:
-            needed, like = (
-                tuple(item for item in part if item[1] >= beliefs.joint_worth)
-                for part in (reported.needed, reported.like)
+            needed = tuple(
+                item
+                for item in reported.needed
+                if _of_group(reported, item) >= beliefs.joint_worth
             )
+            like = tuple(item for item in reported.like if item[1] >= beliefs.joint_worth)
             named = reported.missed(beliefs.family_worth)
             families.append(
                 replace(reported, named=named, members=members, needed=needed, like=like)
@@ -232,6 +241,12 @@ def _of_families(remaining: Left) -> Verdict:
         return replace(whole, status='unknown')
     alone = all(len(group) == 1 for group in sets)
     return whole if alone else replace(whole, status='ambiguous')
+
+
+def _of_group(family: Family, item: tuple[Site, float]) -> float:
+    """Return the share of a member, or of all joints together at which it is the same error."""
+    site, share = item
+    return share * next((len(group) for group in family.alike if site in group), 1)
 
 
 def _sets_of(family: Family) -> list[tuple[Site, ...]]:

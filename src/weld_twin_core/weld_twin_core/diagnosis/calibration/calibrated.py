@@ -137,7 +137,8 @@ def _levels(
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
     if families and cause.effect is not None:
-        kind = of_kind(cause, families[cause.name[0][0].effect], before.floor)
+        named = sum(family.named for family in families.values())
+        kind = of_kind(cause, families[cause.name[0][0].effect], named, before.floor)
         each = (*both, 'name')
         return [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]

@@ -123,11 +123,12 @@ def of_rest(cause: Cause, level: str) -> Numbers:
     )
 
 
-def of_kind(cause: Cause, family: Family, floor: float) -> Numbers:
+def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
     """
     Return the features of a kind of many small errors.
 
     family: how unseen data get worse without it.
+    kinds: how many are named: one or two alone stand in for a cause without a name more often.
     floor: noise [m].
     """
     return plain(
@@ -137,6 +138,7 @@ def of_kind(cause: Cause, family: Family, floor: float) -> Numbers:
             'size': log(family.rms_m / max(floor, 1e-12)),
             'members': len(cause.name),
             'others like it': float(bool(family.like)),
+            'kinds': kinds,
         }
     )
 

@@ -113,7 +113,10 @@ class Workspace:
 
     def hopeless(self, now: Fit) -> float:
         """Return the sum of squares from which on nothing can take the place of what was found."""
-        return now.rss * max(float(np.exp(2.0 * FAR / self.effective(now))), FAR_SHARE)
+        with np.errstate(
+            over='ignore'
+        ):  # without noise a handful of rows count, and nothing is hopeless
+            return now.rss * max(float(np.exp(2.0 * FAR / self.effective(now))), FAR_SHARE)
 
     def beside(self, now: Fit) -> SeedSystems:
         """Return the normal equations of all seeds given a fit: its frames and effects fitted."""

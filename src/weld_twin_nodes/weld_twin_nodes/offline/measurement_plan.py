@@ -32,8 +32,8 @@ MOST = 120
 MOST_ASKED = 500
 """Stations that may be asked for: at ten seconds each and the way between them, two hours."""
 LEAST = 24
-"""Stations below which a fit names too little of what is there: plans that were carried out with 16
-left up to six times what was promised (docs/first_measurement.md)."""
+"""Stations of a plan at the least: after about 15 on measured arms up to six times as much was left as
+is promised of arms as usual (docs/first_measurement.md)."""
 SHOWN = (8, 16, 24, 40, 60, 80, 120)
 """Rows of the table on the terminal, besides the first, the last and the number needed [stations]."""
 SURE = 0.95
@@ -155,6 +155,9 @@ def plan_table(plan: Planned, tolerance: float) -> list[str]:
     far = plan.elsewhere[count]
     beyond = f'may still be off by {far * 1e3:.2g} mm' if far < NOTHING_KNOWN else 'is not known'
     out.append(f'elsewhere in its reach the corrected robot {beyond} after {count} poses')
+    out.append(
+        'all this is of an arm as its kind usually is: one with rough gears keeps up to six times'
+    )
     if plan.needed is None:
         out.append(
             f'all {most} poses that fit into the time keep {wanted} at {plan.within[-1]:.0%} of '

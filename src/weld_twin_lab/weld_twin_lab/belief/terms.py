@@ -39,7 +39,15 @@ NAMED = {
     **NAMES,
 }
 """What speaks for an answer that names causes; against it speaks that one of them has no name."""
-MANY = {'growth': 1, 'least growth': 1, 'size': 1, 'gap': 0, 'structure': -1, 'kinds': 1}
+MANY = {
+    'growth': 1,
+    'least growth': 1,
+    'size': 1,
+    'gap': 0,
+    'structure': -1,
+    'kinds': 1,
+    'lacking': -1,
+}
 """What speaks for a kind of many small errors."""
 REST = {'weight': 1, 'second': -1, 'share': 1, 'steady': 1, 'groups': 0}
 TERMS: dict[str, dict[str, int]] = {
@@ -74,7 +82,7 @@ TERMS: dict[str, dict[str, int]] = {
         'angle': 0,
         'wander': 0,
     },
-    'name of many': {**MANY, 'others like it': 0},
+    'name of many': MANY,
     'place of many': MANY,
     'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},

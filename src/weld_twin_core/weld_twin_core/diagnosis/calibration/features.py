@@ -137,7 +137,6 @@ def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
             'least growth': log1(min(family.growths, default=0.0)),
             'size': log(family.rms_m / max(floor, 1e-12)),
             'members': len(cause.name),
-            'others like it': float(bool(family.like)),
             'kinds': kinds,
         }
     )

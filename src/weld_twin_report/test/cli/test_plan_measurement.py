@@ -46,6 +46,7 @@ def test_a_tolerance_out_of_reach_is_told(weld_twin):
         (('--minutes', 9, '--controller', 'krl'), 'say with --out where'),
         (('--minutes', 9, '--controller', 'basic'), "there is no language 'basic'; known are"),
         (('--minutes', 9, '--noise', -1), 'a tolerance, a noise and a spread above zero'),
+        (('--minutes', 20_000), '--minutes at most 10000'),
     ],
 )
 def test_what_cannot_be_planned_is_one_sentence(weld_twin, words, said):

@@ -117,7 +117,9 @@ def _planned(args: argparse.Namespace) -> int:
     how: dict[str, Any] = {**PLAN, **given}
     minutes = 1.0 if how['minutes'] is None else how['minutes']
     if not (0.0 < how['seconds'] <= 3600.0 and 0.0 < minutes <= 10_000.0):
-        raise DataError('--minutes and --seconds must be above zero')
+        raise DataError(
+            'time must be above zero: --minutes at most 10000, --seconds at most 3600 for a posture'
+        )
     how |= {'noise': how['noise'] * 1e-3, 'spread': radians(how['spread'])}
     if args.region and not args.model:
         raise DataError('--region says where a fitted model is to be sure; give it with --model')

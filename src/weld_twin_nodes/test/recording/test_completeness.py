@@ -178,7 +178,7 @@ def test_a_node_that_missed_what_it_listens_to_is_named(cell, tmp_path):
 
 
 def longer_for_neighbours(cell, out):
-    """Return how much longer a recorder takes to end with neighbours that stand still [s]."""
+    """Return how much longer [s] a recorder ends by neighbours that stand still, and if it names one."""
     out.mkdir()
     process = recorder(cell, out)
     twin, analyzer = (
@@ -196,18 +196,21 @@ def longer_for_neighbours(cell, out):
     finally:
         twin.signal(signal.SIGCONT)
         analyzer.signal(signal.SIGCONT)
-    assert '/forward_kinematics_twin has not told what it sent' in process.log
+    told = '/forward_kinematics_twin has not told what it sent' in process.log
     assert bag_info(out / 'bag') is not None
     twin.stop()
     # How long a node takes to end with nobody in its way is the machine's own, and its load's.
-    return spent - ended(cell, analyzer)
+    return spent - ended(cell, analyzer), told
 
 
 def test_a_recorder_ends_soon_though_its_neighbours_stand_still(cell, tmp_path):
-    for trial in range(10):  # a busy machine makes an end longer, and none shorter
-        longer = longer_for_neighbours(cell, tmp_path / f'{trial}')
-        if longer < 2.7:
+    # A busy machine makes an end longer, and none shorter; a word of the twin that was on its way as
+    # it stood still comes late by chance, and the recorder has no reason to name it then.
+    for trial in range(10):
+        longer, told = longer_for_neighbours(cell, tmp_path / f'{trial}')
+        if told and longer < 2.7:
             break
+    assert told
     assert longer < 2.7
 
 

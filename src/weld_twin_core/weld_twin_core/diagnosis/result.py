@@ -199,6 +199,10 @@ class Family:
     alike: tuple[tuple[Site, ...], ...] = ()
     """Which of the members needed are one error everywhere, and share what it does evenly."""
 
+    def group(self, site: Site) -> tuple[Site, ...]:
+        """Return the members that are the same error as one everywhere, itself included."""
+        return next((group for group in self.alike if site in group), (site,))
+
     @property
     def growth(self) -> float:
         """Return by what share the error grows without it in the median part left out."""

@@ -16,8 +16,7 @@ from weld_twin_core.diagnosis.result import NAMING
 
 from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
-from .there import HALF
-from .there import complete as nothing_missing
+from .there import HALF, LARGE
 from .there import right as right_everywhere
 from .whole import FEW, whole
 
@@ -25,9 +24,6 @@ AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
 AS_GOOD = 1.05
 """RMS left over what the true causes leave, up to which an answer predicts as the truth does."""
-
-LARGE = 0.1
-"""Share of the squared gap from which on a cause that is not told is missing, if it is no noise."""
 
 
 class Example(NamedTuple):
@@ -185,33 +181,26 @@ def _examples(
 ) -> Iterator[tuple[str, Mapping[str, float], bool, float, bool]]:
     """Yield kind, features, whether it was right, the probability reported and whether as sure."""
     causes, at_work = row['verdict']['causes'], _at_work(row['truth'])
+    if 'there' in row:
+        yield from _of_many(row, whole_right)
+        return
     truths = levels_of(row['truth'])
     named_right = whole_right and row['verdict']['status'] in NAMING
     nameless = row['truth']['kind'] in NOT_IN_LIBRARY and not named_right
-    parts = row.get('there')
     for said in row['statements']:
         kind, reported = said['kind'], said['probability']
-        if parts is not None and not kind.endswith('many'):
-            continue  # Every name is at work there, and is right by another event.
         if said['cause'] is None:
             right = {'complete': _complete(row), 'nameless': nameless}.get(kind, whole_right)
             sure = kind.startswith('answer') and bool(row['verdict']['sure'])
             yield kind, said['features'], right, reported, sure
             continue
         cause, level = causes[said['cause']], kind.split()[0]
-        part = parts[said['cause']] if parts is not None else None
-        if parts is not None and part is None:
-            continue
         named = any((n['effect'], n['joint']) in at_work for n in cause['name'])
-        if part is not None:
-            named = part['name'] >= HALF
         if level == 'name':
             right = named
         elif not cause[level] or (named and kind in ('place', 'dependence')):
             # Those of a right name are right; what is learned of them holds where it is wrong.
             continue
-        elif part is not None:
-            right = named or part[level] >= HALF
         else:
             first = cause[level][0]['at' if level == 'place' else 'on']
             right = any(first in own[level == 'dependence'] for own in truths)
@@ -219,10 +208,32 @@ def _examples(
         yield kind, said['features'], right, reported, sure
 
 
+def _of_many(
+    row: Mapping[str, Any], whole_right: bool
+) -> Iterator[tuple[str, Mapping[str, float], bool, float, bool]]:
+    """
+    Yield the same of an arm that is off everywhere, of kinds of many small errors alone.
+
+    Every name is at work there, so that others are right by another event.
+    """
+    verdict = row['verdict']
+    for said in row['statements']:
+        kind, level = said['kind'], said['kind'].split()[0]
+        if not kind.endswith('many'):
+            continue
+        right, sure = whole_right, bool(verdict['sure'])
+        if said['cause'] is not None:
+            cause, part = verdict['causes'][said['cause']], row['there'][said['cause']]
+            if part is None or not cause[level]:
+                continue
+            # Place and dependence of a right name are right.
+            right = max(part['name'], part[level]) >= HALF
+            sure = bool(cause['sure']) and level == 'name'
+        yield kind, said['features'], right, said['probability'], sure
+
+
 def _complete(row: Mapping[str, Any]) -> bool:
     """Return whether no cause above the noise and a tenth of the squared gap is missing."""
-    if 'there' in row:
-        return nothing_missing(row)
     truth, named = row['truth'], set[tuple[str, str | None]]()
     for cause in row['verdict']['causes']:
         if not cause['rest']:

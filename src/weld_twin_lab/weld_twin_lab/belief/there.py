@@ -23,7 +23,7 @@ from weld_twin_core.diagnosis.result import Cause as Told
 
 from ..blind.ambiguous import Site
 from ..blind.blind_cell import as_recording, deviation, exact, record
-from ..blind.cause_sizes import Cause, site
+from ..blind.cause_sizes import site
 from ..blind.making import SealedCase
 from .levels_of_truth import Levels, alike_by_structure, levels_of
 from .visible import fitted, frame_columns
@@ -52,7 +52,9 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
     assert seen.measured is not None
     model, t = found.model, seen.measured.t
     whole = model.twin(0).poses(seen, t).position
-    real = [(own, shown(deviation(cell, [own], case.test))) for own in case.causes]
+    real = [shown(deviation(cell, [own], case.test)) for own in case.causes]
+    sites = [site(own) for own in case.causes]
+    words = [_levels(case, own) for own in sites]
 
     def part_of(told: Told) -> dict[str, float] | None:
         kind = told.name[0][0].effect if told.name and not told.rest else None
@@ -64,11 +66,9 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
         said = shown(whole - rest.twin(0).poses(seen, t).position)
 
         def share(meant: Sequence[bool]) -> float:
-            off = [rows for (_, rows), own in zip(real, meant, strict=True) if own]
+            off = [rows for rows, own in zip(real, meant, strict=True) if own]
             return float(said @ np.sum(off, axis=0) / (said @ said)) if off else 0.0
 
-        sites = [site(own) for own, _ in real]
-        words = [_levels(case, own) for own, _ in real]
         places, dependences = _listed(told.place), _listed(told.dependence)
         return {
             'name': max(share([own in kind for own in sites]) for kind in _kinds(case, names)),
@@ -88,8 +88,8 @@ def _kinds(case: SealedCase, names: Sequence[Site]) -> list[set[Site]]:
     ]
 
 
-def _levels(case: SealedCase, cause: Cause) -> Levels:
-    truth = {'sites': [site(cause)], 'construction': None, 'robot': case.lot.robot}
+def _levels(case: SealedCase, own: Site) -> Levels:
+    truth = {'sites': [own], 'construction': None, 'robot': case.lot.robot}
     return levels_of(truth)[0]
 
 
@@ -97,7 +97,7 @@ def _listed(told: Sequence[tuple[Any, float]]) -> set[str]:
     return {str(word) for word, _ in told}
 
 
-def complete(row: Mapping[str, Any]) -> bool:
+def _complete(row: Mapping[str, Any]) -> bool:
     """Return whether what a model misses on a sealed motion is noise, or a tenth of the gap."""
     left, floor, gap = (row['sealed'][key] for key in ('after', 'floor', 'before'))
     return bool(left**2 - floor**2 <= max(floor**2, LARGE * gap**2))
@@ -106,4 +106,4 @@ def complete(row: Mapping[str, Any]) -> bool:
 def right(row: Mapping[str, Any]) -> bool:
     """Return whether an answer is right as a whole: all that it names is there, and no more."""
     named = [own['name'] >= HALF for own in row['there'] if own is not None]
-    return row['verdict']['status'] in NAMING and all(named) and complete(row)
+    return row['verdict']['status'] in NAMING and all(named) and _complete(row)

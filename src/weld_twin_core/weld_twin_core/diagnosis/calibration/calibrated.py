@@ -95,7 +95,7 @@ def calibrated(
     form: of what places what has no name, as `features.of_form` has it.
     """
     learned = usual_calibration()
-    families = {family.effect: family for family in verdict.families}
+    families = {family.effect: family for family in verdict.families if family.named}
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
         levels = _levels(k, cause, families, before, form, learned)
@@ -137,8 +137,8 @@ def _levels(
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
     if families and cause.effect is not None:
-        named = sum(family.named for family in families.values())
-        kind = of_kind(cause, families[cause.name[0][0].effect], named, before.floor)
+        family = families[cause.name[0][0].effect]
+        kind = of_kind(cause, family, len(families), before.floor)
         each = (*both, 'name')
         return [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]

@@ -218,10 +218,11 @@ def _of_families(remaining: Left) -> Verdict:
     for reported in remaining.evidence.families or ():
         members = tuple(item for item in reported.members if item[1] > beliefs.member_least_m)
         if members:
+            # Joints at which it is the same error count together.
             needed = tuple(
-                item
-                for item in reported.needed
-                if _of_group(reported, item) >= beliefs.joint_worth
+                (site, share)
+                for site, share in reported.needed
+                if share * len(reported.group(site)) >= beliefs.joint_worth
             )
             like = tuple(item for item in reported.like if item[1] >= beliefs.joint_worth)
             named = reported.missed(beliefs.family_worth)
@@ -243,22 +244,13 @@ def _of_families(remaining: Left) -> Verdict:
     return whole if alone else replace(whole, status='ambiguous')
 
 
-def _of_group(family: Family, item: tuple[Site, float]) -> float:
-    """Return the share of a member, or of all joints together at which it is the same error."""
-    site, share = item
-    return share * next((len(group) for group in family.alike if site in group), 1)
-
-
 def _sets_of(family: Family) -> list[tuple[Site, ...]]:
     """
     Return a set for every joint of a kind, or for joints that are alike.
 
     What would do as well as the kind is in the first.
     """
-    groups = dict.fromkeys(
-        next((group for group in family.alike if site in group), (site,))
-        for site, _ in family.needed
-    )
+    groups = dict.fromkeys(family.group(site) for site, _ in family.needed)
     like = [site for site, _ in family.like]
     return [(*group, *(like if k == 0 else ())) for k, group in enumerate(groups)]
 

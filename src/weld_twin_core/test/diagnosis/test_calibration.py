@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.calibration.calibrated import stated
+from weld_twin_core.diagnosis.calibration.calibrated import Stated, Statement, calibrated, stated
 from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.result import Cause, Site
+from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.diagnosis.verdict.evidence import Row
 
 PLAY = Site('backlash', 'elbow_joint')
@@ -131,3 +132,30 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
     assert all(s.features['wander'] > own.features['wander'] for s in imitating)
     assert all(s.probability < own.probability for s in imitating)
     assert other.confidence < right.confidence or other.status == 'unknown'
+
+
+def test_a_set_over_several_places_is_sure_of_none_of_them():
+    zero, tilt = Site('joint_offset', 'wrist'), Site('gear_ratio', 'elbow')
+    slot = (Rival(zero, 9.0, _Fit(), 0.5), Rival(tilt, 9.0, _Fit(), 0.5))
+    row = Row.of(slot, wt.Beliefs())
+    cause = Cause(
+        tuple(row.places().items()),
+        tuple(row.dependences().items()),
+        tuple(row.names().items()),
+        0.9,
+        (0.8, 1.0),
+        (0,),
+        slot=0,
+        effect=0,
+    )
+    names = (Statement('name', 0, {'size': 1.0, 'members': 2.0}, 0.9),)
+    before = Stated((row,), names, None, {}, 1e-5)
+    verdict = Verdict('ambiguous', ((zero, tilt),))
+    _, (told,), _ = calibrated(verdict, (cause,), before, {})
+    assert told.probability == pytest.approx(0.9)
+    assert dict(told.name) == pytest.approx({zero: 0.45, tilt: 0.45})
+    # Where the set is right each place is as likely as its name; only where it is wrong a place may
+    # have more than that.
+    for levels in (dict(told.place), dict(told.dependence)):
+        assert all(0.45 <= p <= 0.55 for p in levels.values())
+        assert sum(levels.values()) <= 1.0 + 1e-9

@@ -11,7 +11,7 @@ from typing import TypeVar
 from ..beliefs import Beliefs
 from ..result import NAMING, Cause, Family
 from ..verdict.decision import Verdict
-from ..verdict.evidence import Evidence, Row
+from ..verdict.evidence import Evidence, Row, marginal
 from .features import (
     TOLD_AS,
     Numbers,
@@ -99,7 +99,14 @@ def calibrated(
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
         levels = _levels(k, cause, families, before, form, learned)
-        reported.append(_with(cause, [one.probability for one in levels], learned))
+        probabilities = [one.probability for one in levels]
+        reported.append(
+            _of_kind(cause, probabilities, learned)
+            if levels[0].kind == 'place of many'
+            else _of_rest(cause, probabilities, learned)
+            if cause.slot is None
+            else _of_slot(cause, before.table[cause.slot], probabilities, learned)
+        )
         said += levels
     kinds = [one for one in said if one.kind == 'name of many']
     slots = [cause for cause in reported if cause.slot is not None]
@@ -165,30 +172,51 @@ def _of_answer(
     return out, [complete, answer]
 
 
-def _with(cause: Cause, levels: Sequence[float], calibration: Calibration) -> Cause:
+def _of_slot(cause: Cause, row: Row, levels: Sequence[float], learned: Calibration) -> Cause:
     """
-    Return a cause with the probabilities of its place, its dependence and, if it has one, its name.
+    Return the cause of an effect found with the probabilities of its place, dependence and name.
 
-    A name that is right is right about place and dependence as well. What is learned of those of an
-    effect found holds where its name is wrong.
+    What is learned of place and dependence holds where no name of the set is right; where one is,
+    each name brings its own along.
     """
-    place, dependence, *name = levels
-    if name and cause.slot is None:
-        # The joints of a kind share what is believed of it, and so do others that are like it.
-        levels_of = _scaled(cause.place, place), _scaled(cause.dependence, dependence)
-        cause = replace(cause, place=levels_of[0], dependence=levels_of[1])
-        named, sure = _scaled(cause.name, name[0]), calibration.sure('cause', name[0])
-        return replace(cause, name=named, probability=name[0], sure=sure)
-    if cause.slot is not None:
-        place, dependence = (name[0] + (1.0 - name[0]) * p for p in (place, dependence))
-    reported = name[0] if name else place if cause.place else 0.0
+    place, dependence, name = levels
+    named = _scaled(cause.name, name)
+    own = {one.site: one for one in row.slot}
+    places = marginal((own[site].place, p) for site, p in named)
+    dependences = marginal((own[site].dependence, p) for site, p in named)
+    return replace(
+        cause,
+        place=_mixed(places, _led(cause.place, place), 1.0 - name),
+        dependence=_mixed(dependences, _led(cause.dependence, dependence), 1.0 - name),
+        name=named,
+        probability=name,
+        sure=learned.sure('cause', name),
+    )
+
+
+def _of_kind(cause: Cause, levels: Sequence[float], learned: Calibration) -> Cause:
+    """Return a kind of many with its probabilities, which its joints and its likes share."""
+    place, dependence, name = levels
+    return replace(
+        cause,
+        place=_scaled(cause.place, place),
+        dependence=_scaled(cause.dependence, dependence),
+        name=_scaled(cause.name, name),
+        probability=name,
+        sure=learned.sure('cause', name),
+    )
+
+
+def _of_rest(cause: Cause, levels: Sequence[float], learned: Calibration) -> Cause:
+    """Return what has no name with the probabilities of its place and dependence."""
+    place, dependence = levels
+    reported = place if cause.place else 0.0
     return replace(
         cause,
         place=_led(cause.place, place),
         dependence=_led(cause.dependence, dependence),
-        name=_scaled(cause.name, name[0]) if name else cause.name,
         probability=reported,
-        sure=calibration.sure('cause', reported),
+        sure=learned.sure('cause', reported),
     )
 
 
@@ -206,6 +234,14 @@ def _led(listed: Sequence[tuple[Key, float]], first: float) -> tuple[tuple[Key, 
     room = (1.0 - first) / max(1.0 - own, 1e-9)
     rest = [(key, min(p * room, first)) for key, p in others]
     return ((leader, first), *rest)
+
+
+def _mixed(
+    right: Mapping[str, float], otherwise: Sequence[tuple[str, float]], wrong: float
+) -> tuple[tuple[str, float], ...]:
+    """Return what is believed where a name is right and where none is, most probable first."""
+    out = marginal([*right.items(), *((key, wrong * p) for key, p in otherwise)])
+    return tuple(sorted(out.items(), key=lambda item: -item[1]))
 
 
 def _scaled(listed: Sequence[tuple[Key, float]], total: float) -> tuple[tuple[Key, float], ...]:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds for the tests of every package, and which of them run side by side."""
 
+import difflib
 import fcntl
 import gc
 import os
@@ -35,6 +36,11 @@ def pytest_collection_finish():
     """Look for garbage from now on, and only in what is made from now on."""
     gc.freeze()
     gc.enable()
+
+
+def pytest_addoption(parser):
+    """Take an option that keeps what is said now, for whoever meant to change it."""
+    parser.addoption('--keep', action='store_true', help='keep texts as they are now')
 
 
 CELLS = 'cells'
@@ -149,6 +155,47 @@ def elbow_found(once):
         assert said.code == 0, said.err
 
     return once('elbow_found', diagnosed)
+
+
+NUMBER = re.compile(r'-?\d+(?:\.(\d+))?(?:e([-+]\d+))?')
+
+
+def nearly(now, before):
+    """Return whether two texts differ in no word, and in numbers by one of their last digit."""
+    if NUMBER.sub('#', now) != NUMBER.sub('#', before):
+        return False
+    pairs = zip(NUMBER.finditer(now), NUMBER.finditer(before), strict=True)
+    return all(
+        abs(float(a[0]) - float(b[0])) < 1.5 * 10.0 ** (int(b[2] or 0) - len(b[1] or ''))
+        for a, b in pairs
+        if a[0] != b[0]
+    )
+
+
+@pytest.fixture
+def kept(request):
+    """
+    Return a function that holds a text against the one kept under its name beside the test.
+
+    What is long and nearly another text is kept as what differs from that. After a change that is
+    meant to change what is said, `pytest --keep PATH` keeps it anew, and the difference is read.
+    """
+
+    def hold(name, text, base=None):
+        if base is not None:
+            both = base.splitlines(), text.splitlines()
+            text = '\n'.join(list(difflib.unified_diff(*both, n=0, lineterm=''))[2:]) + '\n'
+            text = re.sub('^@@.*@@$', '@@', text, flags=re.MULTILINE)
+        file = request.path.parent / 'kept' / f'{name}.txt'
+        if request.config.getoption('--keep'):
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text, encoding='utf-8')
+        before = file.read_text(encoding='utf-8')
+        if not nearly(text, before):
+            told = difflib.unified_diff(before.splitlines(), text.splitlines(), 'kept', 'now')
+            pytest.fail('\n'.join(told))
+
+    return hold
 
 
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')

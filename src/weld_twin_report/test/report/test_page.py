@@ -122,38 +122,6 @@ def test_the_picture_is_drawn_from_the_deviations_of_the_diagnosis():
     assert np.allclose(path + left + part, 1e6 * case.traces.measured[0][shown], atol=0.2)
 
 
-def test_outliers_are_counted_and_not_drawn():
-    case = diagnoses.backlash()
-    traces = case.traces
-    wild = [np.array(part) for part in traces.before]
-    wild[0][7] = [0.05, 0.0, 0.0]
-    good = [np.ones(len(part), bool) for part in wild]
-    good[0][7] = False
-    spoilt = replace(traces, before=tuple(wild), trusted=tuple(good))
-    assert page_data(replace(case, traces=spoilt))['top'] < 2.0 * page_data(case)['top']
-    page = report_page(replace(case, traces=spoilt)).replace('\N{NO-BREAK SPACE}', ' ')
-    told = re.findall(r'\(1 sample left out: [^)]*\)', page)
-    assert set(told) == {'(1 sample left out: 50.00 mm at 0.1 s)'}
-    assert 'not drawn' not in report_page(case)
-
-
-def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
-    wanted = {
-        'kind': 'bidirectional',
-        'sentence': 'Measure base_pose anew.',
-        'reason': 'It shows.',
-        'expected_separation_sigma': 12.3,
-        'cost': 20.0,
-        'motion': {'static': True, 't': [0.125], 'q': [[0.625]]},
-    }
-    page = report_page(replace(diagnoses.ambiguous(), next_experiment=wanted))
-    part = page[page.index('id="next"') : page.index('id="checks"')]
-    assert 'Measure base pose error anew.' in part
-    assert 'about 20 min' in part
-    assert '12 standard deviations' in part
-    assert '0.625' not in part
-
-
 def test_unsound_stations_without_a_floor_have_a_page():
     case = diagnoses.nothing()
     bare = replace(case.gap, noise_floor_m=float('nan'))

@@ -1,0 +1,86 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A page as lines of text: what is read, what its scripts are given, and how long its bars are."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+
+INLINE = {'b', 'span', 'strong', 'i', 'a', 'small', 'label', 'em', 'code', 'sub', 'sup', 'abbr'}
+SHOWN = (
+    'style',
+    'hidden',
+    'open',
+    'checked',
+    'href',
+    'width',
+    'height',
+    'd',
+    'points',
+    'transform',
+)
+LONG = 6
+"""Numbers of a list from which on their count, and a sum of them weighed by place, stand for them."""
+
+
+class _Text(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines, self.line, self.inside = [], '', ''
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.inside = '' if tag not in ('style', 'script') else given.get('type') or tag
+        if tag not in INLINE:
+            self.end()
+        kept = [
+            f'{key}={value}'
+            for key, value in given.items()
+            if value and (key in SHOWN or key.startswith('data-')) and len(value) < 200
+        ]
+        self.line += f'[{" ".join(kept)}]' if kept else ''
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = ''
+        self.end() if tag not in INLINE else None
+
+    def handle_data(self, data: str) -> None:
+        if self.inside == 'application/json':
+            self.end()
+            self.lines += [f'{at} {value}' for at, value in flat(json.loads(data), '') if value]
+        elif not self.inside:
+            self.line += data
+
+    def end(self) -> None:
+        told = re.sub(r'\s+', ' ', self.line).strip()
+        self.lines += [told] if told else []
+        self.line = ''
+
+
+def page_text(page: str) -> str:
+    """Return a page as lines of text."""
+    reader = _Text()
+    reader.feed(page)
+    reader.end()
+    return '\n'.join(reader.lines) + '\n'
+
+
+def flat(value: Any, at: str) -> list[tuple[str, Any]]:
+    """Return the single values in lists and mappings, each with its place; long lists as two sums."""
+    if isinstance(value, dict):
+        return [one for key, own in value.items() for one in flat(own, f'{at}/{key}')]
+    if isinstance(value, list | tuple):
+        try:
+            numbers = np.asarray(value, float).ravel()
+        except (TypeError, ValueError):
+            numbers = np.zeros(0)
+        if numbers.size < LONG:
+            return [one for k, own in enumerate(value) for one in flat(own, f'{at}/{k}')]
+        weighed = np.nan_to_num(numbers) @ np.cos(np.arange(numbers.size) ** 2)
+        return [(at, f'{numbers.size} {np.linalg.norm(numbers):.4g} {weighed:.4g}')]
+    return [(at, f'{value:.6g}' if isinstance(value, float) else value)]

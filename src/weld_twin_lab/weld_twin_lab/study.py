@@ -185,13 +185,9 @@ def engine_digest() -> str:
     return hashlib.sha256('\n'.join(whole).encode()).hexdigest()
 
 
-def kept_of_engine(folder: Path, *more: str) -> Path:
-    """
-    Return where the tasks of a study are kept that this engine has done.
-
-    more: what else makes other results of the same tasks.
-    """
-    return folder / DONE / '-'.join((engine_digest()[:8], *more))
+def kept_of_engine(folder: Path) -> Path:
+    """Return where the tasks of a study are kept that this engine has done."""
+    return folder / DONE / engine_digest()[:8]
 
 
 def require_simulator() -> None:

@@ -56,4 +56,4 @@ def test_agreement_is_learned_and_judged_on_cells_that_were_not_learned_from():
     assert same > own > 0.0
     probability = unseen(all_)
     assert probability[all_.right].mean() > probability[~all_.right].mean() + 0.3
-    assert '120 answers of 120 cells' in page(all_)
+    assert '120 answers of 120 cells' in page(cells)

@@ -11,7 +11,6 @@ from pkgutil import iter_modules
 from weld_twin_nodes.cli.options import add_command
 
 from . import lab_jobs
-from .retired import LAB, add_retired, add_retired_options, refuse_retired
 
 
 def proofs() -> dict[str, str]:
@@ -24,11 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the proofs, each with its options."""
     places = parser.add_subparsers(required=True, metavar='PROOF', dest='proof', title='proofs')
     for name, path in proofs().items():
-        add_retired_options(add_command(places, name, import_module(path)), name)
-    add_retired(places, LAB)
+        add_command(places, name, import_module(path))
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the proof."""
-    refuse_retired(args)
     return int(import_module(proofs()[args.proof]).run(args))

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files import markdown
 
 from ..belief.logistic import Weights, fitted
 
@@ -93,10 +95,17 @@ def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
     return counts[0], counts[1]
 
 
-def page(all_: Heard) -> str:
-    """Return what was learned, and what it is worth on cells that it was not learned from."""
-    from weld_twin_msgs_py.files import markdown
+def page(cases: Sequence[Mapping[str, Any]]) -> str:
+    """
+    Return what was learned, and what it is worth on cells that it was not learned from.
 
+    cases: as `heard` takes them.
+
+    Raises DataError: none of them has two diagnoses of the same round.
+    """
+    all_ = heard(cases)
+    if not len(all_.right):
+        raise DataError('none of the cells has two diagnoses of the same round; give other tables')
     fit, probability = weights(all_), unseen(all_)
     learned = zip((*SIGNS, 'added'), (*fit.slopes, fit.bias), strict=True)
     rows = [(f'{least:.2f}', *map(str, reached(all_, probability, least))) for least in TRIED]

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...study import Study, kept_of_engine, options, require_simulator, study
+from ...study import Study, options, require_simulator, study
 
 TABLE, GROWING = 'answers.jsonl', 'growing'
 
@@ -23,7 +23,6 @@ OPTIONS = options(
 --beside NAME=TABLE ...  tables that other engines made of the same cells
 --growing                diagnose every cell with one to four recordings, and in reverse: does more
   data hurt?
---without NAME ...       take mechanisms of the diagnosis out: what are they worth?
 """,
     out='where everything goes',
     pool=True,
@@ -56,22 +55,17 @@ def run(study: Study) -> None:
 
 
 def _answers(study: Study) -> list[dict[str, Any]]:
-    """Return what the engine at hand answers, without the mechanisms that are taken out."""
+    """Return what the engine at hand answers."""
     from weld_twin_nodes.offline.task_pool import Task
 
     from ...belief.baseline import brief
     from ...belief.mix import SEVERAL
-    from ...belief.switches import tried_without, without
+    from ...belief.trial import tried
 
     require_simulator()
-    args, out_of_it = study.args, tuple(sorted(study.args.without))
-    with without(out_of_it):  # refuses a name that is none before anything is made
-        store = kept_of_engine(study.out, *out_of_it)
-    tasks = [
-        Task(tried_without, (args.seed, k, SEVERAL, out_of_it), f'cell {k}')
-        for k in range(args.cases)
-    ]
-    return [brief(row) for row in study.tasks(tasks, 'diagnosing', store)]
+    args = study.args
+    tasks = [Task(tried, (args.seed, k, SEVERAL), f'cell {k}') for k in range(args.cases)]
+    return [brief(row) for row in study.tasks(tasks, 'diagnosing')]
 
 
 def _growing(study: Study) -> None:

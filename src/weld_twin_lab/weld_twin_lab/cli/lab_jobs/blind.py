@@ -24,7 +24,6 @@ from ...study import (
     require_simulator,
     study,
 )
-from ..retired import BLIND, add_retired
 
 DRAW = """
 --cases N         how many [default: 400]
@@ -51,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     places = parser.add_subparsers(required=True, metavar='JOB', dest='job')
     for name, (add, command) in JOBS.items():
         add_command(places, name, job(command.__doc__, add))
-    add_retired(places, BLIND)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -15,8 +15,6 @@ from typing import Any
 from weld_twin_nodes.cli.options import add_command
 from weld_twin_nodes.cli.parsing import add_options
 
-from ..retired import CAMPAIGNS, add_retired, add_retired_options
-
 OUT = '--out FILE, required  JSON file to write, or to replace if it is of the same campaign'
 FAILED = 1
 """Exit code of a campaign that ran and did not pass."""
@@ -29,10 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(required=True, metavar='CAMPAIGN', dest='campaign')
     for name in campaigns.names():
         module = import_module(f'{campaigns.__name__}.{name}')
-        job = add_command(jobs, name, module)
-        add_options(job, OUT)
-        add_retired_options(job, f'campaign {name}')
-    add_retired(jobs, CAMPAIGNS)
+        add_options(add_command(jobs, name, module), OUT)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,65 +6,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
+from ..effects import REGISTRY, Effect
+from ..effects.frame_errors import FrameError
+from ..effects.geometry import ChannelError
 from ..errors import ModelError
-from .dh_draws import DhDraws, SeamDraws
+from ..twin.twin import Twin
+from .determining_samples import determining
 from .expansion import CHUNK, Expansion, expand, expandable
 from .outcome import Outcomes, joined, outcomes
 from .seam_study import Study
 from .tolerance import Tolerance, with_draws
 
-_VALUES = {
-    ('joint_offset', 'offset'): 'theta',
-    ('link_offset', 'dd'): 'd',
-    ('link_length', 'da'): 'a',
-    ('link_twist', 'dalpha'): 'alpha',
-}
-"""Effect and parameter, and the DH value that it adds to; an offset of a joint turns its row."""
-
-
-@dataclass(frozen=True, eq=False)
-class _DhStudy:
-    """A study whose tolerances are all of DH values."""
-
-    study: Study
-    tolerances: tuple[Tolerance, ...]
-    seam: SeamDraws
-    """The nominal robot at the samples of the study."""
-
-    def deviations(self, draws: Array) -> Array:
-        """Return the deviations of draws (D, P) in seam axes, shape (3, D, N) [m]."""
-        robot = self.study.robot
-        values = {
-            key: np.repeat(getattr(robot, key)[None], len(draws), axis=0)
-            for key in DhDraws._fields
-        }
-        for column, tolerance in zip(draws.T, self.tolerances, strict=True):
-            key = _VALUES[tolerance.effect, tolerance.parameter]
-            values[key][:, robot.index(str(tolerance.joint))] += column
-        away = self.seam.deviations(DhDraws(**values))
-        return np.moveaxis(self.study.on_seam(away), -1, 0)
-
-
-def _dh_study(study: Study, tolerances: Sequence[Tolerance]) -> _DhStudy | None:
-    """Return the fast form of a study, or None where something else than DH values counts."""
-    if study.known or any((t.effect, t.parameter) not in _VALUES for t in tolerances):
-        return None
-    joints = study.recording.joints
-    q = joints.q if study.at is None else joints.at(study.at)[0]
-    try:
-        return _DhStudy(study, tuple(tolerances), SeamDraws(study.robot, q))
-    except ModelError:  # modified rows, or joints that slide
-        return None
-
-
 _CHECKED = 32
 """Runs on which the expansion is compared with the exact twin."""
 _AGREED = 1e-3
 """Difference, relative to the largest deviation of a run, at which the expansion is not used."""
+
+
+class _Few(NamedTuple):
+    """
+    Samples that determine all others.
+
+    ``spread`` (3, 3 S, N) makes deviations at all samples along, across and normal to the seam
+    from those at the ``samples`` (S,) in the world.
+    """
+
+    samples: NDArray[np.int_]
+    spread: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +52,8 @@ class Model:
     error: float
     """Largest difference of a deviation to the exact twin, relative to the largest deviation of
     its run, over the runs compared; 0 for exact runs."""
-    fast: _DhStudy | None = None
-    """Runs draws of nothing but DH values exactly."""
+    few: _Few | None = None
+    """Samples at which exact runs are made; None for all."""
 
     def __call__(self, draws: Array) -> Outcomes:
         """Return what runs come to, draws shape (D, P)."""
@@ -94,9 +68,12 @@ class Model:
 
     def _exact(self, draws: Array) -> Array:
         """Return deviations, components first, shape (3, D, N) [m]."""
-        if self.fast is not None:
-            return self.fast.deviations(draws)
-        return np.moveaxis(exact_deviations(self.study, self.tolerances, draws), -1, 0)
+        if self.few is None:
+            return np.moveaxis(exact_deviations(self.study, self.tolerances, draws), -1, 0)
+        study, at = self.study, self.few.samples
+        twin = Twin(study.robot, with_draws(study.known, self.tolerances, draws))
+        away = twin.poses(study.recording, study.t[at]).position - study.nominal.position[at]
+        return np.asarray(away.reshape(len(draws), -1) @ self.few.spread)
 
     def at_probabilities(self, unit: Array) -> Outcomes:
         """Return what runs come to at probabilities of every tolerance, shape (D, P)."""
@@ -114,8 +91,7 @@ def model(
     study : Study
     tolerances : sequence of Tolerance
     exact : bool
-        Run every draw exactly: those of nothing but DH values by `dh_draws`, all others
-        through the twin.
+        Run every draw exactly.
     seed : int
         Chooses the runs on which the expansion is compared.
 
@@ -127,13 +103,28 @@ def model(
     """
     if not tolerances:
         raise ModelError('a study needs at least one tolerance')
-    if exact or not expandable(tolerances):
-        return Model(study, tuple(tolerances), None, 0.0, _dh_study(study, tolerances))
-    expansion = expand(study, tolerances)
-    error = _disagreement(expansion, np.random.default_rng(seed))
-    if error > _AGREED:
-        return Model(study, tuple(tolerances), None, 0.0, _dh_study(study, tolerances))
-    return Model(study, tuple(tolerances), expansion, error)
+    if not exact and expandable(tolerances):
+        expansion = expand(study, tolerances)
+        error = _disagreement(expansion, np.random.default_rng(seed))
+        if error <= _AGREED:
+            return Model(study, tuple(tolerances), expansion, error)
+    return Model(study, tuple(tolerances), None, 0.0, _few(study, tolerances))
+
+
+def _few(study: Study, tolerances: Sequence[Tolerance]) -> _Few | None:
+    """Return the samples that determine all others; None where more than constants is at work."""
+    kinds: list[type[Effect]] = [type(effect) for effect in study.known]
+    kinds += [REGISTRY[tolerance.effect] for tolerance in tolerances]
+    if any(kind.needs or not issubclass(kind, (ChannelError, FrameError)) for kind in kinds):
+        return None
+    joints = study.recording.joints
+    q = joints.q if study.at is None else joints.at(study.at)[0]
+    result = determining(study.robot, q)
+    if result is None:
+        return None
+    samples, spread = result
+    onto_seam = np.einsum('ns,nij->isjn', spread, study.axes)
+    return _Few(samples, onto_seam.reshape(3, -1, len(q)))
 
 
 def draws_at(tolerances: Sequence[Tolerance], unit: Array) -> Array:

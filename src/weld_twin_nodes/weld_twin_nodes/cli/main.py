@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from weld_twin_core import __version__
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import DataError, TwinError
 
 from ..offline.environment import THREADS
 from .options import add_command
@@ -140,9 +140,7 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
     chosen = OLD.get(typed, typed).partition(' ')[0]
     package = COMMANDS.get(chosen, '').partition('.')[0]
     if package and not _installed(package):
-        parser.error(
-            f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
-        )
+        parser.error(_lacks(typed, package))
     for name in [chosen] if package else [name for name in COMMANDS if name not in BEFORE]:
         if _installed(COMMANDS[name].partition('.')[0]):
             _add(subparsers, name, chosen)
@@ -184,6 +182,22 @@ def _jobs(module: ModuleType | None) -> dict[str, Any]:
 
 def _installed(package: str) -> bool:
     return find_spec(package) is not None
+
+
+def _lacks(typed: str, package: str) -> str:
+    return f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
+
+
+def brought(module: str, typed: str) -> ModuleType:
+    """
+    Return a module of a package that whoever asks does not know, for what was typed.
+
+    Raises DataError: the package is not installed.
+    """
+    package = module.partition('.')[0]
+    if not _installed(package):
+        raise DataError(_lacks(typed, package))
+    return import_module(module)
 
 
 def _one_line(error: Exception) -> str:

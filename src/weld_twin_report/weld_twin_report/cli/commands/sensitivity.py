@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_nodes.cli.main import brought
 from weld_twin_nodes.cli.options import ANY_ROBOT, TOPICS, folder_output, robot_of, topics_of
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from weld_twin_core.sensitivity.tolerance import Tolerance
 
     from ...sensitivity_report import Setting
+    from ...sensitivity_report.study_files import Claims
 
 EXAMPLE = 'weld-twin sensitivity --robot ur5 --path spline --out study'
 _WORK = 'weld_twin_report.sensitivity_report.work'
@@ -80,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         for drawing in drawings:
             print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
-    robots = _claims_robots(args)
+    claims = _claims(args)
     with (
         closing(pool_of(args.scheduler, args.workers or 0, ahead=_WORK)) as pool,
         _progress() as tell,
@@ -91,9 +93,8 @@ def run(args: argparse.Namespace) -> int:
             args.out,
             pool,
             setting,
-            claims_on=robots,
+            claims=claims,
             tell=tell,
-            seed=args.seed,
             force=args.force,
         )
     _print_summary(Path(args.out))
@@ -170,12 +171,13 @@ def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]
         raise ModelError(f"tolerance file '{args.tolerances}': {error}") from None
 
 
-def _claims_robots(args: argparse.Namespace) -> list[Robot]:
-    from weld_twin_msgs_py.robots import load_robot
-
-    from ...sensitivity_report.study_files import ROBOTS
-
-    return [load_robot(name) for name in args.claims_robots or ROBOTS] if args.claims else []
+def _claims(args: argparse.Namespace) -> Claims | None:
+    """Return what measures the claims of the paper; they are a proof, which another package brings."""
+    if not args.claims:
+        return None
+    study = brought('weld_twin_lab.claims.study', '--claims')
+    claims: Claims = study.claims_on(args.claims_robots, args.seed)
+    return claims
 
 
 def _print_summary(place: Path) -> None:

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ...errors import DataError
+from weld_twin_core.errors import DataError
+
 from .rules import RULES, Measured, Range, Rule
 
 HOLDS, HOLDS_WHEN, DOES_NOT = 'holds', 'holds when', 'does not hold'

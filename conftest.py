@@ -16,6 +16,9 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+# Modules that tests of every package may use.
+sys.path.append(str(Path(__file__).parent / 'test'))
+
 # One core is enough for arrays of this size, and the test machine has other work.
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 # The tests start hundreds of processes; without files of bytecode each compiles all it imports.
@@ -158,30 +161,39 @@ def elbow_found(once):
 
 
 NUMBER = re.compile(r'-?\d+(?:\.(\d+))?(?:e([-+]\d+))?')
+NEAR, NOTHING = 2e-3, 1e-8
+"""Share by which numbers may differ, for other versions of what computes them, and what is rounding."""
 
 
 def nearly(now, before):
-    """Return whether two texts differ in no word, and in numbers by one of their last digit."""
+    """Return whether two texts differ in no word, and in numbers by hardly one of the last digit."""
     if NUMBER.sub('#', now) != NUMBER.sub('#', before):
         return False
     pairs = zip(NUMBER.finditer(now), NUMBER.finditer(before), strict=True)
-    return all(
-        abs(float(a[0]) - float(b[0])) < 1.5 * 10.0 ** (int(b[2] or 0) - len(b[1] or ''))
-        for a, b in pairs
-        if a[0] != b[0]
-    )
+    return all(close(a, b) for a, b in pairs if a[0] != b[0])
+
+
+def close(now, before):
+    """Return whether two numbers as they were written are alike."""
+    one, other = float(now[0]), float(before[0])
+    if now[2] and before[2] and max(abs(one), abs(other)) < NOTHING:
+        return True
+    digit = 10.0 ** (int(before[2] or 0) - len(before[1] or ''))
+    return abs(one - other) < max(1.5 * digit, NEAR * abs(other)) * bool(before[1] or before[2])
 
 
 @pytest.fixture
 def kept(request):
     """
-    Return a function that holds a text against the one kept under its name beside the test.
+    Return a function that holds a text or a page against what is kept under its name beside the test.
 
     What is long and nearly another text is kept as what differs from that. After a change that is
     meant to change what is said, `pytest --keep PATH` keeps it anew, and the difference is read.
     """
+    from page_text import page_text
 
     def hold(name, text, base=None):
+        text = page_text(text) if text.startswith('<!doctype html>') else text
         if base is not None:
             both = base.splitlines(), text.splitlines()
             text = '\n'.join(list(difflib.unified_diff(*both, n=0, lineterm=''))[2:]) + '\n'

@@ -4,10 +4,13 @@
 
 import json
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from page_text import flat, page_text
 
+from weld_twin_core import __version__
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.paths import default_seam
@@ -23,6 +26,9 @@ from weld_twin_nodes.offline.task_pool import (
     pool_of,
 )
 from weld_twin_report.sensitivity_report import Effort, Setting
+from weld_twin_report.sensitivity_report.figures import draw, drawable
+from weld_twin_report.sensitivity_report.study_files import run_claims
+from weld_twin_report.sensitivity_report.study_page import study_page
 from weld_twin_report.sensitivity_report.work import run_study
 
 
@@ -105,6 +111,30 @@ def test_a_study_that_was_stopped_resumes_to_the_same_result(setting, tmp_path):
     assert sorted(tmp_path.iterdir()) == kept
     plain = [json.dumps(r, default=lambda a: a.tolist()) for r in (whole, again)]
     assert plain[0] == plain[1]
+
+
+def test_a_study_is_as_it_was_kept(setting, kept):
+    with Runner(Here()) as runner:
+        study = json.loads(json.dumps(run_study(setting, runner), default=lambda a: a.tolist()))
+    kept('study', both_forms(study_page(study, None, ()), study))
+
+
+def test_figures_are_as_they_were_kept(setting, kept):
+    drawn = [replace(draw(setting, key), svg='') for key in drawable(setting)]
+    tables = [{key: value.tolist() for key, value in each.table.items()} for each in drawn]
+    kept('figures', both_forms(study_page(None, None, drawn), tables))
+
+
+def test_claims_are_as_they_were_kept(setting, kept):
+    with Runner(Here()) as runner:
+        claims = run_claims(runner, [setting.robot], ['line'])
+    kept('claims', both_forms(study_page(None, claims, ()), claims))
+
+
+def both_forms(page, numbers):
+    """Return what a page says, and every number of a file."""
+    lines = [f'{at} {value}' for at, value in flat(numbers, '')]
+    return '\n'.join([page_text(page).replace(__version__, 'VERSION'), *lines]) + '\n'
 
 
 def test_a_damaged_result_is_named(tmp_path):

@@ -24,8 +24,8 @@ SHOWN = (
     'points',
     'transform',
 )
-LONG = 6
-"""Numbers of a list from which on their count, and a sum of them weighed by place, stand for them."""
+LONG, NOTHING = 6, 1e-9
+"""Items of a list from which on sums stand for them, and a size that is rounding."""
 
 
 class _Text(HTMLParser):
@@ -71,16 +71,32 @@ def page_text(page: str) -> str:
 
 
 def flat(value: Any, at: str) -> list[tuple[str, Any]]:
-    """Return the single values in lists and mappings, each with its place; long lists as two sums."""
+    """
+    Return the single values in lists and mappings, each with its place.
+
+    Of long lists of numbers two sums stand for them; rows of one kind are told column by column.
+    """
     if isinstance(value, dict):
         return [one for key, own in value.items() for one in flat(own, f'{at}/{key}')]
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple) and len(value):
+        if len(value) >= LONG and all(
+            isinstance(row, dict) and row.keys() == value[0].keys() for row in value
+        ):
+            return flat({key: [row[key] for row in value] for key in value[0]}, at)
+        if len(value) >= LONG and all(isinstance(own, str) for own in value):
+            return [(at, ', '.join(value))]
         try:
             numbers = np.asarray(value, float).ravel()
         except (TypeError, ValueError):
             numbers = np.zeros(0)
         if numbers.size < LONG:
             return [one for k, own in enumerate(value) for one in flat(own, f'{at}/{k}')]
-        weighed = np.nan_to_num(numbers) @ np.cos(np.arange(numbers.size) ** 2)
-        return [(at, f'{numbers.size} {np.linalg.norm(numbers):.4g} {weighed:.4g}')]
-    return [(at, f'{value:.6g}' if isinstance(value, float) else value)]
+        numbers = np.nan_to_num(numbers)
+        weighed = numbers @ np.cos(np.arange(numbers.size) ** 2)
+        return [(at, f'{numbers.size} {_told(np.linalg.norm(numbers))} {_told(weighed)}')]
+    return [(at, _told(value) if isinstance(value, float) else value)]
+
+
+def _told(value: float) -> str:
+    """Return a number with the digits that every machine gives; what is nothing but rounding is 0."""
+    return f'{value:.4g}' if abs(value) > NOTHING else '0'

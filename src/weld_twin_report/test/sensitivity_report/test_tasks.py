@@ -12,9 +12,13 @@ from page_text import flat, page_text
 
 from weld_twin_core import __version__
 from weld_twin_core.arm import catalog
+from weld_twin_core.effects import JointOffset
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.sensitivity import default_tolerances
+from weld_twin_core.twin.twin import Twin
 from weld_twin_nodes.offline.content_hash import digest
 from weld_twin_nodes.offline.task_pool import (
     Cluster,
@@ -116,6 +120,21 @@ def test_a_study_is_as_it_was_kept(setting, kept):
     with Runner(Here()) as runner:
         study = json.loads(json.dumps(run_study(setting, runner), default=lambda a: a.tolist()))
     kept('study', both_forms(study_page(study, None, ()), study))
+
+
+def test_what_was_recorded_stands_beside_what_tolerances_make(setting, kept):
+    motion = plan(setting.robot, setting.path, 'smooth', rate_hz=50.0).motion
+    commanded = Recording('seam', motion)
+    real = Twin(setting.robot, [JointOffset('elbow_joint', offset=1e-3)]).poses(commanded)
+    recording = commanded.with_measured(Measurements(motion.t, real.position))
+    asked = replace(setting, recording=recording, effort=Effort(16, 100, 2, 1))
+    with Runner(Here()) as runner:
+        study = json.loads(json.dumps(run_study(asked, runner), default=lambda a: a.tolist()))
+    rows = study['motions']['recorded']['local']['parameters']
+    peak = next(row for row in rows if row['name'] == 'joint_offset.elbow_joint.offset')
+    assert study['recorded']['max_m'] == pytest.approx(1e-3 * peak['S_analytic_peak_m'], rel=1e-3)
+    drawn = replace(draw(asked, 'recorded'), svg='')
+    kept('recorded', both_forms(study_page(study, None, [drawn]), study['recorded']))
 
 
 def test_figures_are_as_they_were_kept(setting, kept):

@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.algebra.columns import Columns
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
-from weld_twin_core.diagnosis.algebra.problem import Scale
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
 
 TRUE = (
     effect('joint_offset', joint='elbow_joint', offset=6e-4),
@@ -65,6 +70,16 @@ def test_predictions_are_those_of_least_squares_on_the_other_stretches(columns, 
     # with 230 columns one inverse per stretch serves every choice of effects
     unseen = made_up(columns, 5, prior=30.0)
     np.testing.assert_allclose(unseen.predict(kept), refitted(unseen, kept), atol=1e-7)
+
+
+@pytest.mark.parametrize('prior', [1e-3, 30.0, 1e5])
+def test_what_the_data_determine_is_what_the_fit_follows(prior):
+    """As many coordinates as the trace of the matrix that leads from targets to their fit."""
+    unseen = made_up(20, 5, prior=prior)
+    columns = unseen.columns.written_out()
+    system = columns @ columns.T + np.diag(unseen.precision)
+    follows = np.trace(np.linalg.solve(system, columns @ columns.T))
+    assert unseen.determined() == pytest.approx(follows, rel=1e-6)
 
 
 @pytest.mark.parametrize('kept', [[], [0, 2]])
@@ -127,6 +142,26 @@ def test_the_error_on_unseen_stretches_exceeds_that_of_the_fit():
     found = fit(problem, model.with_found(TRUE), scale)
     unseen = Unseen.of(problem, scale, found, np.zeros(0))
     assert unseen.rms(unseen.predict([0, 1, 2])) > unseen.rms(found.residual)
+
+
+def test_frames_by_a_metre_do_not_take_the_place_of_play_that_is_left_out():
+    """The tool keeps its direction on a seam, and base and tool move against each other for nothing."""
+    robot, play = load('ur5'), effect('backlash', joint='shoulder_pan_joint', width=5e-4)
+    motion = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=50.0).motion
+    back = JointMotion(
+        np.append(motion.t, motion.t[-1] + motion.t[1:]),
+        np.concatenate([motion.q, motion.q[-2::-1]]),
+    )
+    commanded = Recording('seam', back)
+    position = Twin(robot, (play,)).poses(commanded, back.t).position
+    position = position + np.random.default_rng(5).normal(scale=SIGMA, size=position.shape)
+    seam = commanded.with_measured(Measurements(back.t, position))
+    problem = Problem((seam,), frozenset(('base', 'tool')))
+    model, scale = Model(robot, (robot.T_world_base,)), known_scale(problem)
+    nominal = fit(problem, model, scale)
+    found = fit(problem, nominal.model.with_found((play,)), scale)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    assert unseen.rms(unseen.bare) > 0.95 * unseen.rms(nominal.residual)
 
 
 def test_squared_errors_are_metres_of_the_trusted_samples_whatever_their_weight():

@@ -278,10 +278,15 @@ def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
     return joint if name == 'q' else None
 
 
-def designed(problem: Problem, model: Model, scale: Scale) -> Columns:
-    """Return the whitened columns of frames, then of the found effects, of a model."""
+def designed(problem: Problem, model: Model, scale: Scale, framed: Model | None = None) -> Columns:
+    """
+    Return the whitened columns of frames, then of the found effects, of a model.
+
+    framed: the model at which frames have their columns; the same when left out.
+    """
     features = problem.features(model)
-    frames = Piece(problem.whitened(problem.frame_columns(features)[0], scale))
+    around = features if framed is None else problem.features(framed)
+    frames = Piece(problem.whitened(problem.frame_columns(around)[0], scale))
     maker = Maker(problem, features, scale)
     each = (maker.piece(effect, atoms=False) for effect in model.found)
     return Columns.joined([frames, *each])

@@ -9,7 +9,9 @@ carry over to where the arm has not been.
 The found effects are small, so around the final fit every smaller model is linear: the exact
 contribution of each effect is put back into the residual where it is left out, and the coordinates
 of those kept are fitted anew on the other stretches. Normal equations of every stretch are formed
-once; a model is a choice of columns and targets.
+once; a model is a choice of columns and targets. Frames have the columns of the arm without the
+effects: where a seam or a SCARA hardly tells base from tool, frames move by a metre for nothing,
+and a metre times the turn of an effect that is left out would take that effect's place.
 """
 
 from __future__ import annotations
@@ -82,7 +84,7 @@ class Unseen:
             same = made.problem is problem and made.scale is scale
             if same and np.array_equal(given, precision):
                 return made
-        columns = designed(problem, fit.model, scale)
+        columns = designed(problem, fit.model, scale, fit.model.with_found(()))
         frames = columns.count - fit.coordinates.size
         sizes = (effect.fit.coordinates().size for effect in fit.model.found)
         ends = np.cumsum([frames, *sizes]).tolist()
@@ -296,6 +298,10 @@ class Unseen:
         """Return the right-hand side of every column on all stretches but one."""
         right = self._rights[b] @ mix if mix[1:].any() else self.rights_of_residual[b][:, 0]
         return np.asarray(right - self.pull)
+
+    def determined(self) -> float:
+        """Return how many coordinates the data determine rather than their prior."""
+        return float(np.clip(1.0 - self.precision * _spread(self._total), 0.0, 1.0).sum())
 
     def wandered(self) -> Array:
         """

@@ -64,6 +64,10 @@ STRAINED = 1.0
 """Squared distance from what is believed, in standard deviations, from which on that may hold back."""
 LEAST_NOISE = 3e-5
 """What an arm and an instrument leave at the least [m]: arms repeat within 0.02 to 0.1 mm."""
+NOISE_TRUST = 8.0
+"""So many rows' worth of belief in a noise that was expected."""
+KEPT = 0.05
+"""Share of the rows at the least that count as not used up by a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +299,8 @@ def robust_scale(
     """
     reported = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
-    lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
+    size = max(problem.size, 1)
+    kept = max(1.0 - freedom / size, 0.0)
     # Shifts and turns as sure as usual ones.
     residuals = [
         part if root is None else np.einsum('mij,jm->im', root, part)
@@ -303,8 +308,12 @@ def robust_scale(
     ]
     position = np.concatenate([measured_axes(part[:3]).ravel() for part in residuals])
     turn = np.concatenate([part[3:].ravel() for part in residuals])
-    sigma = robust_spread(position) / lost
-    sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
+    sigma, sigma_turn = robust_spread(position), robust_spread(turn) if turn.size else 1.0
+    if freedom > 0.0:
+        # As many coordinates as rows leave nothing of a noise that is there all the same.
+        trust = NOISE_TRUST / size
+        sigma = float(np.sqrt((sigma**2 + trust * LEAST_NOISE**2) / (kept + trust)))
+        sigma_turn /= np.sqrt(max(kept, KEPT))
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
     sigma = max(sigma, 1e-9)

@@ -32,6 +32,7 @@ from scipy.linalg.blas import dger
 from scipy.linalg.lapack import dpotri
 
 from ...arrays import Array
+from ..algebra.fit import NOISE_TRUST
 
 SIZES = np.array([0.0001, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 """Sizes of an error in units of what machines have: a ten-thousandth is none, for a thousandth of all of
@@ -51,8 +52,6 @@ SWEEPS, LEARNING = 100, 20
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
-NOISE_TRUST = 8.0
-"""So many rows' worth of belief in the noise expected."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,160 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A conversation with the server in this process: every answer to it is as it was kept."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+
+import pytest
+from page_text import page_text
+from served import form
+
+for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
+    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
+
+SHOWN = ('location', 'content-type', 'content-security-policy', 'set-cookie', 'cache-control')
+TABLE = (('data.csv', b'a,b\n1,2\n'),)
+FORM = 'application/x-www-form-urlencoded'
+MASKS = (
+    (r'\b[0-9a-f]{64}\b', 'USER'), (r'\b[0-9a-f]{32}\b', 'JOB'), (r'\d{4}-\d\d-\d\d \d\d:\d\d', 'WHEN'),
+    (r'\[data-[^]]*\]|\[href=[^]]*\]', ''),
+)  # fmt: skip
+
+
+class Visitor:
+    """Somebody who talks to the application, and keeps cookies."""
+
+    def __init__(self, app, address='10.0.0.1', **headers):
+        self.app, self.address, self.headers, self.cookies = app, address, headers, {}
+        self.last = ''
+
+    def ask(self, path, body=b'', kind='', *, method=None, **headers):
+        """Return what is kept of an answer."""
+        return asyncio.run(
+            self._ask(method or ('POST' if kind else 'GET'), path, body, kind, headers)
+        )
+
+    async def _ask(self, method, path, body, kind, headers):
+        given = {'host': 'localhost:8765', **self.headers, **headers}
+        given |= {'content-type': kind, 'content-length': str(len(body))} if kind else {}
+        if self.cookies:
+            given['cookie'] = '; '.join(f'{name}={value}' for name, value in self.cookies.items())
+        place, _, query = path.partition('?')
+        scope = {
+            'type': 'http', 'http_version': '1.1', 'asgi': {'version': '3.0'}, 'scheme': 'http',
+            'method': method, 'path': place, 'raw_path': place.encode(), 'root_path': '',
+            'query_string': query.encode(), 'client': (self.address, 4711),
+            'server': ('localhost', 8765),
+            'headers': [(k.replace('_', '-').encode(), v.encode()) for k, v in given.items()],
+        }  # fmt: skip
+        parts, sent = [body], []
+
+        async def receive():
+            if parts:
+                return {'type': 'http.request', 'body': parts.pop(), 'more_body': False}
+            return {'type': 'http.disconnect'}
+
+        async def send(message):
+            sent.append(message)
+
+        await self.app(scope, receive, send)
+        head = [(name.decode(), value.decode()) for name, value in sent[0]['headers']]
+        for name, value in head:
+            if name == 'set-cookie':
+                self.cookies.update([value.partition(';')[0].split('=', 1)])
+        self.last = dict(head).get('location', self.last)
+        text = b''.join(message.get('body', b'') for message in sent[1:]).decode()
+        text = page_text(text) if text.startswith('<!doctype html>') else text
+        lines = [
+            f'{method} {path}: {sent[0]["status"]}',
+            *(f'{k}: {v}' for k, v in head if k in SHOWN),
+        ]
+        whole = '\n'.join([*lines, *text.splitlines()[:40]])
+        for pattern, name in MASKS:
+            whole = re.sub(pattern, name, whole)
+        return whole
+
+
+@pytest.fixture
+def app(tmp_path):
+    """Return an application in which nobody works, so that everything waits."""
+    from weld_twin_report.serve import Settings
+    from weld_twin_report.serve.access import Doors
+    from weld_twin_report.serve.app import make_app
+    from weld_twin_report.serve.queue import Queue
+
+    settings = Settings(tmp_path, names=('cell.example',), token='right', workers=0, upload=3000,
+                        own=3, proxy=True)  # fmt: skip
+    queue = Queue(settings)
+    yield make_app(settings, queue, Doors())
+    queue.stop()
+
+
+def test_who_is_let_in(app, kept):
+    who = Visitor(app)
+    said = [
+        who.ask('/'),
+        who.ask('/?token=wrong'),
+        who.ask('//elsewhere.example/?token=right&of=a'),
+        who.ask('/live'),
+        who.ask('/live', host='evil.example'),
+        who.ask('/live', host='CELL.example:80'),
+        who.ask('/live', host='[::1]:8765'),
+        Visitor(app, authorization='Bearer right').ask('/live'),
+        Visitor(app, authorization='Bearer wrong').ask('/live'),
+        who.ask('/me', b'key=x', FORM, origin='http://evil.example'),
+        who.ask('/me', b'key=x', FORM, origin='http://localhost:8765'),
+        who.ask('/me', b'key=x', FORM, sec_fetch_site='cross-site'),
+        who.ask('/nothing/here'),
+    ]
+    kept('let_in', '\n\n'.join(said) + '\n')
+
+
+def test_what_is_dropped_waits_and_is_seen_by_nobody_else(app, kept):
+    one, other = (Visitor(app, authorization='Bearer right') for _ in range(2))
+    said = [one.ask('/recordings'), one.ask('/recordings', *form(files=TABLE, align='base'))]
+    mine = one.last
+    said += [one.ask(mine), other.ask(mine), other.ask('/recordings', *form(files=TABLE))]
+    said += [
+        other.ask(other.last),
+        one.ask('/recordings', *form(robot='no_robot', files=TABLE)),
+        one.ask('/recordings', *form(files=())),
+        one.ask('/recordings', *form(files=TABLE, tolerance='-1')),
+        one.ask('/recordings', *form(files=(('data.csv', b'x' * 4000),))),
+        one.ask('/recordings', *form(files=(('data.exe', b'x'),))),
+        one.ask(f'{mine}/report.html'),
+        one.ask(f'{mine}/again', *form(files=(), robot='ur10')),
+        one.ask(f'{mine}/history', b'', FORM),
+        one.ask('/program'),
+        one.ask('/program', *form(files=(('seam.src', b'DEF a()\nEND\n'),))),
+        one.ask(
+            '/program', *form(files=(('seam.src', b'DEF a()\nEND\n'),), of=mine.rpartition('/')[2])
+        ),
+        *(one.ask('/recordings', *form(files=TABLE)) for _ in range(3)),
+        one.ask('/recordings'),
+        other.ask(f'{mine}/delete', b'', FORM),
+        one.ask(f'{mine}/delete', b'', FORM),
+        one.ask(mine),
+    ]
+    kept('dropped', '\n\n'.join(said) + '\n')
+
+
+def test_who_one_is_goes_along_with_a_key(app, kept):
+    one, other = (Visitor(app, address, authorization='Bearer right', x_forwarded_for='1.2.3.4')
+                  for address in ('127.0.0.1', '10.0.0.2'))  # fmt: skip
+    said = [one.ask('/recordings', *form(files=TABLE)), one.ask('/me'), one.ask('/history')]
+    key = one.cookies['weld_twin_user']
+    said += [
+        other.ask('/me', b'key=' + b'0' * 64, FORM),
+        other.ask('/me', f'key= {key.upper()} '.encode(), FORM),
+        other.ask('/recordings'),
+        other.ask('/me/leave', b'', FORM),
+        one.ask('/me/delete', b'sure=no', FORM),
+        one.ask('/me/delete', b'sure=yes', FORM),
+        one.ask('/recordings'),
+        one.ask('/plant'),
+        one.ask('/history/line%203'),
+    ]
+    kept('keys', '\n\n'.join(said) + '\n')

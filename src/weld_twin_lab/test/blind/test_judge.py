@@ -16,35 +16,33 @@ NOTHING = truth('none')
 
 
 @pytest.mark.parametrize(
-    ('case', 'verdict', 'outcome', 'named', 'right'),
+    ('case', 'verdict', 'named', 'right'),
     [
-        (ONE, diagnosis('identified', [A]), 'exact', True, True),
-        (ONE, diagnosis('ambiguous', [A, C]), 'exact', True, True),
-        (ONE, diagnosis('identified', [A], [C]), 'partial', True, False),
-        (ONE, diagnosis('identified', [C]), 'wrong', False, False),
-        (ONE, diagnosis('unknown', [A]), 'exact', True, False),
-        (ONE, diagnosis('none'), 'silent', False, False),
-        (ONE, None, 'silent', False, False),
-        (TWO, diagnosis('identified', [A], [B]), 'exact', True, True),
-        (TWO, diagnosis('identified', [B, C], [A, B]), 'exact', True, True),
-        (TWO, diagnosis('identified', [A]), 'partial', False, False),
-        (TWO, diagnosis('ambiguous', [A, B]), 'partial', False, False),
-        (TWO, diagnosis('identified', [A, B], [C]), 'partial', False, False),
-        (NOTHING, diagnosis('none'), 'exact', False, True),
-        (NOTHING, diagnosis('identified', [A]), 'wrong', False, False),
-        (truth('outside', [offset('a')]), diagnosis('unknown', [C]), 'wrong', False, True),
-        (truth('withheld', [offset('a')]), diagnosis('ambiguous', [C]), 'wrong', False, False),
+        (ONE, diagnosis('identified', [A]), True, True),
+        (ONE, diagnosis('ambiguous', [A, C]), True, True),
+        (ONE, diagnosis('identified', [A], [C]), True, False),
+        (ONE, diagnosis('identified', [C]), False, False),
+        (ONE, diagnosis('unknown', [A]), True, False),
+        (ONE, diagnosis('none'), False, False),
+        (ONE, None, False, False),
+        (TWO, diagnosis('identified', [A], [B]), True, True),
+        (TWO, diagnosis('identified', [B, C], [A, B]), True, True),
+        (TWO, diagnosis('identified', [A]), False, False),
+        (TWO, diagnosis('ambiguous', [A, B]), False, False),
+        (TWO, diagnosis('identified', [A, B], [C]), False, False),
+        (NOTHING, diagnosis('none'), False, True),
+        (NOTHING, diagnosis('identified', [A]), False, False),
+        (truth('outside', [offset('a')]), diagnosis('unknown', [C]), False, True),
+        (truth('withheld', [offset('a')]), diagnosis('ambiguous', [C]), False, False),
     ],
 )
-def test_a_verdict_is_worth_what_it_says_of_the_causes(case, verdict, outcome, named, right):
+def test_a_verdict_is_worth_what_it_says_of_the_causes(case, verdict, named, right):
     judged = judge(case, verdict)
-    assert (judged.set, judged.named, judged.right) == (outcome, named, right)
+    assert (judged.named, judged.right) == (named, right)
 
 
 def test_a_set_that_cannot_be_told_apart_counts_once_for_two_causes():
-    judged = judge(TWO, diagnosis('ambiguous', [A, B]))
-    assert judged.family is True
-    assert not judged.named
+    assert not judge(TWO, diagnosis('ambiguous', [A, B])).named
 
 
 def test_the_like_of_an_ambiguous_construction_is_as_good_as_the_truth():
@@ -60,15 +58,6 @@ def test_seven_equal_lags_are_as_good_as_one_late_clock():
     all_seven = [[('servo_lag', f'j{k}')] for k in range(7)]
     assert judge(case, diagnosis('identified', *all_seven)).right
     assert not judge(case, diagnosis('identified', [('servo_lag', 'j0')])).right
-
-
-def test_family_and_joint_are_judged_apart():
-    judged = judge(ONE, diagnosis('identified', [B]))
-    assert (judged.family, judged.joint) == (True, False)
-    judged = judge(ONE, diagnosis('identified', [C]))
-    assert (judged.family, judged.joint) == (False, True)
-    assert judge(truth('single', [{'effect': 'drift'}]), diagnosis('none')).joint is None
-    assert judge(NOTHING, diagnosis('none')).family is None
 
 
 @pytest.mark.parametrize(

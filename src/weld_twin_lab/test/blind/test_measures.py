@@ -8,8 +8,7 @@ import pytest
 from blind_verdicts import diagnosis, offset, truth
 
 from weld_twin_lab.blind.judging import judge
-from weld_twin_lab.blind.measures import alias_measure, calibration_measures, verdict_measures
-from weld_twin_lab.blind.scoring import Score, page
+from weld_twin_lab.blind.scoring import measures, page
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
 
@@ -45,46 +44,31 @@ CASES = [
 @pytest.mark.parametrize(
     ('key', 'value', 'count'),
     [
-        ('single_family', 3 / 5, 5),
-        ('single_joint', 3 / 5, 5),
-        ('single_exact', 2 / 5, 5),
-        ('faint_named', 1 / 2, 2),
-        ('double_named', 1 / 2, 2),
-        ('triple_named', None, 0),
-        ('false_alarm', 1 / 2, 2),
-        ('withheld_honest', 1 / 2, 2),
-        ('withheld_unknown', 0.0, 2),
-        ('outside_unknown', 1.0, 1),
-        ('false_unknown', 1 / 13, 13),
+        ('single', 3 / 8, 8),
+        ('double', 2 / 3, 3),
+        ('triple', None, 0),
+        ('none', 1 / 2, 2),
+        ('withheld', 0.0, 2),
+        ('outside', 1.0, 1),
         ('confident_wrong', 7 / 16, 16),
     ],
 )
 def test_measures_are_the_counts_made_by_hand(key, value, count):
-    measure = next(m for m in verdict_measures(CASES) if m.key == key)
+    measure = next(m for m in measures(CASES) if m.key == key)
     assert measure.estimate.cases == count
     assert measure.estimate.value == (None if value is None else pytest.approx(value))
 
 
 def test_a_goal_is_reached_from_the_right_side():
-    reached = {m.key: m.reached for m in verdict_measures(CASES)}
-    assert reached['single_family'] is False
-    assert reached['false_alarm'] is False
-    assert reached['triple_named'] is None
-    assert reached['outside_unknown'] is None
-    assert {m.key: m.reached for m in verdict_measures(CASES[:1])}['single_family'] is True
+    reached = {m.key: m.reached for m in measures(CASES)}
+    assert reached['confident_wrong'] is False
+    assert reached['single'] is None
+    assert {m.key: m.reached for m in measures(CASES[:1])}['confident_wrong'] is True
 
 
 def test_calibration_leaves_out_cases_without_a_verdict():
-    measures = {m.key: m.estimate for m in calibration_measures([*CASES[:2], single(None)])}
-    assert measures['brier'].value == pytest.approx((0.01 + 0.81) / 2)
-    assert measures['ece'].value == pytest.approx(abs(0.9 - 0.5))
-
-
-def test_a_cause_nobody_knows_may_be_unknown_or_predicted_as_well():
-    cases = [case for case in CASES if case.kind in ('outside', 'withheld')]
-    measure = alias_measure(cases, {case.name: 1.04 for case in cases if case.said})
-    assert (measure.estimate.value, measure.estimate.cases) == (1.0, 3)
-    assert alias_measure(cases, {}).estimate.value == pytest.approx(1 / 3)
+    found = {m.key: m.estimate for m in measures([*CASES[:2], single(None)])}
+    assert found['ece'].value == pytest.approx(abs(0.9 - 0.5))
 
 
 def test_the_page_names_every_failure_and_why_there_is_no_verdict():
@@ -102,7 +86,14 @@ def test_the_page_names_every_failure_and_why_there_is_no_verdict():
         'median_memory_mib': 3.0,
         'most_memory_mib': 4.0,
     }
-    score = Score(made, CASES, {}, costs, {'case_0001': 'no joint moves'})
+    score = {
+        'made': made,
+        'count': len(CASES),
+        'measures': [measure.as_dict() for measure in measures(CASES)],
+        'costs': costs,
+        'errors': {'case_0001': 'no joint moves'},
+        'cases': [case.as_dict() for case in CASES],
+    }
     failed = [line for line in page(score).splitlines() if line.startswith('| case_')]
     assert len(failed) == sum(not case.right for case in CASES)
     assert any('no joint moves' in line for line in failed)

@@ -4,10 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from weld_twin_core.arrays import Array
@@ -15,30 +11,11 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
 from weld_twin_core.diagnosis.frames.alignment import initial_frames, refined
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
-from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.diagnosis_model import read_model
-from weld_twin_msgs_py.robots import load_robot
-
-from . import layout
-from .displacement import rms
 
 NORMAL_90 = 1.6448536269514722
 """Half-width of a normal 90 % interval in standard deviations."""
 TO_90 = NORMAL_90 / 1.959963984540054
 """Half-width of a normal 90 % interval over that of a 95 % one."""
-
-
-def over_floor(cases: Path, truths: Path, truth: Mapping[str, Any], diagnosis: Path) -> float:
-    """
-    Return the RMS left on the sealed recording over what the true causes would leave.
-
-    diagnosis: the diagnosis.json with the model.
-    """
-    name = str(truth['name'])
-    robot = load_robot(str(cases / name / layout.ROBOT))
-    test = read_recording(truths / name / layout.TEST, robot)
-    remaining = gap_on(read_model(robot, diagnosis), test)[counted(test, truth['outliers'])]
-    return rms(remaining) / float(truth['floor_m'])
 
 
 def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:

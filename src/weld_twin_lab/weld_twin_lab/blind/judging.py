@@ -41,13 +41,8 @@ class Judged:
     sure: bool
     stratum: float
     """Effect RMS over noise, of the weakest cause."""
-    set: str
-    """'exact', 'partial', 'wrong' or 'silent': the causes named, against those at work."""
     named: bool
     """Whether every cause at work is in a set of its own."""
-    family: bool | None
-    joint: bool | None
-    """Whether family, and joint, of every cause at work are named; None where there is none."""
     right: bool
     """What the confidence is about: the set is exact, or nothing was to be found and nothing was
     said, or the library lacks the cause and the verdict is 'unknown'."""
@@ -56,11 +51,6 @@ class Judged:
     def confidently_wrong(self) -> bool:
         """Return whether it names what is wrong, or denies what is there, and is sure of it."""
         return self.sure and not self.right and self.status != 'unknown'
-
-    @property
-    def in_library(self) -> bool:
-        """Return whether the library knows every cause at work."""
-        return self.kind in IN_LIBRARY
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values."""
@@ -92,10 +82,7 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         float(verdict.get('confidence') or 0.0),
         is_sure(verdict),
         float(min(truth['ratios'], default=0.0)),
-        _set(exact, matched, groups),
         whole and bool(answer) and status != 'error',
-        _all(_family, answers, groups),
-        _all(_joint, answers, groups),
         _right(kind, status, exact),
     )
 
@@ -127,14 +114,6 @@ def _share(answer: Sequence[Site], groups: Sequence[set[Site]]) -> float:
     return _matched(answer, groups) / max(len(answer), 1)
 
 
-def _set(exact: bool, matched: int, groups: Sequence[set[Site]]) -> str:
-    if exact:
-        return 'exact'
-    if not groups:
-        return 'silent'
-    return 'partial' if matched else 'wrong'
-
-
 def _right(kind: str, status: str, exact: bool) -> bool:
     if kind == 'none':
         return status == 'none'
@@ -152,30 +131,6 @@ def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
     truth: as `making.truth_of` gives it.
     """
     return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
-
-
-def _all(
-    is_named: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]
-) -> bool | None:
-    """Return whether all parts of one answer are told, None where there is nothing to tell."""
-    judged = [
-        parts
-        for parts in ([is_named(at, groups) for at in answer] for answer in answers)
-        if any(part is not None for part in parts)
-    ]
-    if not judged:
-        return None
-    return any(all(part is not False for part in parts) for parts in judged)
-
-
-def _family(at: Site, groups: Sequence[set[Site]]) -> bool:
-    return any(at[0] == family for group in groups for family, _ in group)
-
-
-def _joint(at: Site, groups: Sequence[set[Site]]) -> bool | None:
-    if at[1] is None:
-        return None
-    return any(at[1] == joint for group in groups for _, joint in group)
 
 
 def _in_words(sites: Iterable[Sequence[Any]]) -> str:

@@ -4,67 +4,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
 from ..study import tabled
 from . import layout, seal
-from .achieved import over_floor
-from .judging import NOT_IN_LIBRARY, Judged, judge
-from .measures import (
-    Measure,
-    alias_measure,
-    calibration_measures,
-    measure_table,
-    verdict_measures,
-)
+from .judging import Judged, judge
+from .measures import Measure, Question, measure_table, measured
+from .statistics import calibration_error
 
 MIB = 1 << 20
 """Bytes."""
+KINDS = {
+    'single': 'one cause',
+    'double': 'two causes',
+    'triple': 'three causes',
+    'ambiguous': 'ambiguous by construction',
+    'none': 'no cause',
+    'outside': 'cause outside the library',
+    'withheld': 'family withheld',
+}
+"""Kinds of cases in words."""
 
 
-@dataclass(frozen=True, eq=False)
-class Score:
-    """Everything there is to say about a blind check."""
+def _is(kind: str, case: Judged) -> bool:
+    return case.kind == kind
 
-    made: dict[str, Any]
-    """Seed, seal, engine and how the diagnosis was run."""
-    cases: list[Judged]
-    left: dict[str, float]
-    """RMS left over what the true causes leave, by case name, where causes were named."""
-    costs: dict[str, float]
-    """Median and largest seconds and memory of a diagnosis."""
-    errors: Mapping[str, str]
-    """By case name, why there is no verdict."""
 
-    @property
-    def measures(self) -> list[Measure]:
-        """Return the measures, in the order they are told."""
-        return [
-            *verdict_measures(self.cases),
-            alias_measure(self.cases, self.left),
-            *calibration_measures(self.cases),
-        ]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        return {
-            'made': self.made,
-            'count': len(self.cases),
-            'measures': [measure.as_dict() for measure in self.measures],
-            'costs': self.costs,
-            'errors': dict(self.errors),
-            'left': self.left,
-            'cases': [case.as_dict() for case in self.cases],
-        }
+QUESTIONS = (
+    *(
+        Question(kind, f'{words}: right', partial(_is, kind), attrgetter('right'))
+        for kind, words in KINDS.items()
+    ),
+    Question(
+        'confident_wrong',
+        'sure and wrong',
+        lambda case: True,
+        attrgetter('confidently_wrong'),
+        0.01,
+        False,
+    ),
+)
+"""What verdicts are measured by."""
 
 
 def score(
@@ -73,9 +62,9 @@ def score(
     results: Path,
     *,
     seal_given: str = '',
-) -> Score:
+) -> dict[str, Any]:
     """
-    Return the score of verdicts.
+    Return the score of verdicts in plain values.
 
     cases, truths, results: as `make` and `diagnose_cases` wrote them.
     seal_given: the seal as printed before the diagnosis; left out, the one stored holds.
@@ -83,34 +72,34 @@ def score(
     Raises DataError: a case or truth was changed, or the verdicts are on other cases.
     """
     opened = seal.opened(cases, truths, seal_given)
-    listed = _verdicts_on(cases, results)
-    verdicts = {verdict['name']: verdict for verdict in listed['verdicts']}
-    judged: list[Judged] = []
-    remaining = {}
+    about = layout.read(results / layout.VERDICTS)
+    if about['seal'] != layout.read(cases / layout.CASES)['seal']:
+        raise DataError(f"the verdicts in '{results}' are on other cases than those in '{cases}'")
+    verdicts = {verdict['name']: verdict for verdict in about.pop('verdicts')}
+    judged = []
     for truth in opened:
         name = truth['name']
         file = results / name / layout.DIAGNOSIS
-        diagnosis = None if verdicts[name]['error'] else read_diagnosis(file)
-        case = judge(truth, diagnosis)
-        judged.append(case)
-        if diagnosis and case.kind in NOT_IN_LIBRARY and case.status in NAMING:
-            remaining[name] = over_floor(cases, truths, truth, file)
-    about = {key: value for key, value in listed.items() if key not in ('schema', 'verdicts')}
-    made = {'seed': layout.read(truths / layout.TRUTHS)['seed'], **about}
-    return Score(
-        made,
-        judged,
-        remaining,
-        _costs(list(verdicts.values())),
-        {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']},
-    )
+        judged.append(judge(truth, None if verdicts[name]['error'] else read_diagnosis(file)))
+    seed = layout.read(truths / layout.TRUTHS)['seed']
+    return {
+        'made': {**about, 'seed': seed},
+        'count': len(judged),
+        'measures': [measure.as_dict() for measure in measures(judged)],
+        'costs': _costs(list(verdicts.values())),
+        'errors': {name: v['error'] for name, v in verdicts.items() if v['error']},
+        'cases': [case.as_dict() for case in judged],
+    }
 
 
-def _verdicts_on(cases: Path, results: Path) -> dict[str, Any]:
-    listed = layout.read(results / layout.VERDICTS)
-    if listed['seal'] != layout.read(cases / layout.CASES)['seal']:
-        raise DataError(f"the verdicts in '{results}' are on other cases than those in '{cases}'")
-    return listed
+def measures(cases: Sequence[Judged]) -> list[Measure]:
+    """Return how often which kind of case was answered rightly, and what confidence is worth."""
+    answered = [case for case in cases if case.status != 'error']
+    error = calibration_error([c.confidence for c in answered], [c.right for c in answered])
+    return [
+        *measured(QUESTIONS, cases),
+        Measure('ece', 'expected calibration error', error, 0.03, False),
+    ]
 
 
 def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:
@@ -124,25 +113,25 @@ def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-def page(score: Score) -> str:
+def page(score: Mapping[str, Any]) -> str:
     """Return measures, cases that were missed, and what a diagnosis costs."""
-    made, costs = score.made, score.costs
+    made, costs, count = score['made'], score['costs'], score['count']
     seen = 'could be read' if made['truths_readable'] else 'could not be read'
-    missed = [case for case in score.cases if not case.right]
-    columns: dict[str, Callable[[Judged], str]] = {
-        'case': lambda case: case.name,
-        'kind': lambda case: f'{case.kind}, {case.robot}, {case.motion}',
-        'truth (RMS over noise)': lambda case: f'{case.truth} ({case.stratum:.1f})',
-        'verdict': lambda case: f'{case.status}: {case.said or "-"}',
-        'confidence': lambda case: f'{case.confidence:.2f}',
-        'why there is none': lambda case: score.errors.get(case.name, ''),
+    missed = [case for case in score['cases'] if not case['right']]
+    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        'case': lambda case: case['name'],
+        'kind': lambda case: f'{case["kind"]}, {case["robot"]}, {case["motion"]}',
+        'truth (RMS over noise)': lambda case: f'{case["truth"]} ({case["stratum"]:.1f})',
+        'verdict': lambda case: f'{case["status"]}: {case["said"] or "-"}',
+        'confidence': lambda case: f'{case["confidence"]:.2f}',
+        'why there is none': lambda case: score['errors'].get(case['name'], ''),
     }
     return '\n'.join(
         [
-            f'# {len(score.cases) - len(missed)} of {len(score.cases)} cases answered rightly\n',
+            f'# {count - len(missed)} of {count} cases answered rightly\n',
             f'Seed {made["seed"]}, seal {made["seal"]}, engine {made["engine"][:16]} of version '
             f'{made["version"]}. Truths {seen} from where the cases were diagnosed.\n',
-            measure_table([measure.as_dict() for measure in score.measures]),
+            measure_table(score['measures']),
             f'A diagnosis took {costs["median_seconds"]:.1f} s in the median, '
             f'{costs["most_seconds"]:.1f} s at most, and {costs["most_memory_mib"]:.0f} MiB.\n',
             *([tabled(columns, missed)] if missed else []),

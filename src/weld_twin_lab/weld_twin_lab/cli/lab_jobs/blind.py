@@ -139,7 +139,7 @@ def _scored(study: Study, cases: Path, truths: Path, results: Path, seal: str = 
     from ...blind.scoring import page, score
 
     result = score(cases, truths, results, seal_given=seal)
-    study.write('score', result.as_dict(), page(result))
+    study.write('score', result, page(result))
 
 
 def _spans(seconds: str) -> tuple[float, float]:

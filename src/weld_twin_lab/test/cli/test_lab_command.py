@@ -11,7 +11,7 @@ from weld_twin_nodes.cli import main
 
 
 def test_older_proofs_answer_under_lab():
-    assert {'benchmark', 'blind', 'campaign', 'transfer'} <= set(lab.proofs())
+    assert {'benchmark', 'blind', 'campaign'} <= set(lab.proofs())
 
 
 def test_every_proof_tells_what_it_does(capsys):

@@ -23,7 +23,7 @@ from weld_twin_core.recording import Measurements, Recording
 from weld_twin_msgs_py.tables import read_camera, read_pixels, read_target
 
 from ..real_arms.sources import motoman
-from ..transfer.unseen import ALIGN, PLAIN, plain_fit, residual
+from ..real_arms.unseen import ALIGN, PLAIN, plain_fit, residual
 
 PARTS = 5
 """Stretches of time, each left out in turn."""

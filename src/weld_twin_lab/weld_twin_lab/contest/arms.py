@@ -16,8 +16,8 @@ from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.markdown import table
 
 from ..blind.achieved import measured_of
-from ..transfer.splits import all_splits
-from ..transfer.unseen import ALIGN, plain_fit
+from ..real_arms.splits import all_splits
+from ..real_arms.unseen import ALIGN, plain_fit
 from .case import case_of, put
 from .course import Run
 

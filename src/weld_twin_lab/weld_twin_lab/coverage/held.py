@@ -18,7 +18,7 @@ from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.posterior import expected_poses, largest_sigma
 from weld_twin_core.twin.twin import Twin
 
-from ..transfer.unseen import flagged
+from ..real_arms.unseen import flagged
 
 HOLD = 0.9
 """Share of the errors that a region promises to hold."""

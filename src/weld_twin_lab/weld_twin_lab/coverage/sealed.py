@@ -36,7 +36,7 @@ from ..blind.cause_sizes import Cause, site
 from ..blind.displacement import rms
 from ..blind.everywhere import small_errors
 from ..blind.making import SealedCase, one_arm
-from ..transfer.unseen import flagged
+from ..real_arms.unseen import flagged
 from .held import held, twin_for, within
 from .oracle import oracle_sigma
 

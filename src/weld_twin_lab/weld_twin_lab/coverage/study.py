@@ -18,9 +18,9 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 
 from ..programs.cells import CELLS
+from ..real_arms.splits import TUNED_ON, Split, all_splits
+from ..real_arms.unseen import ALIGN, plain_fit, residual
 from ..study import Parts, require_simulator
-from ..transfer.splits import TUNED_ON, Split, all_splits
-from ..transfer.unseen import ALIGN, plain_fit, residual
 from .held import held
 from .others import of_seam, of_touches, of_years
 from .planned import carried_out

@@ -17,8 +17,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files import markdown
 
-from ..transfer.splits import alone
-from ..transfer.unseen import ALIGN, PLAIN, plain_fit, residual
+from .splits import alone
+from .unseen import ALIGN, PLAIN, plain_fit, residual
 
 WAYS = ('frames', 'geometry', 'statics', 'efforts')
 """Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""

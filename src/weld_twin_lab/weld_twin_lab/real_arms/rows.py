@@ -16,10 +16,9 @@ from weld_twin_core.contacts import Contacts
 from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
-from ..transfer import splits
-from ..transfer.splits import Rows, alone
-from . import sources
+from . import sources, splits
 from .sources import Source
+from .splits import Rows, alone
 
 COUNTS = (15, 30, 60, 120)
 """Stations of a subset: from hardly enough to plenty."""

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
@@ -29,8 +30,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_msgs_py.robots import load_robot
 
-from ..transfer.servo_axis import axis_recording, axis_robot
-from ..transfer.splits import HOME, alone, stations
+from .splits import HOME, alone, stations
 
 SOCKETS = 0.05
 """Distance of the sockets [m], as their drawing has it."""
@@ -76,8 +76,29 @@ def tracked(data: Path, name: str) -> Source:
 
 
 def servo(data: Path) -> Source:
-    """Return the servo axis, which slides."""
-    return Source(axis_robot(), axis_recording(data / 'emps'), ())
+    """
+    Return a servo axis, one joint that slides: its reference, and what was measured on the load side.
+
+    Across the axis nothing was measured; those coordinates are zero.
+
+    Raises DataError: the file is missing or holds something else.
+    """
+    path = data / 'emps' / 'DATA_EMPS.mat'
+    if not path.is_file():
+        raise DataError(f"'{path}' is missing; docs/transfer.md says where the data come from")
+    try:
+        content = loadmat(path)
+        t, wanted, measured = (np.ravel(content[key]) for key in ('t', 'qg', 'qm'))
+    except (KeyError, ValueError, NotImplementedError, OSError) as error:
+        raise DataError(f"'{path}' is not the recording of the servo axis: {error}") from None
+    position = np.zeros((t.size, 3))
+    position[:, 2] = measured
+    joint = {'name': 'axis', 'type': 'prismatic'}
+    return Source(
+        Robot.from_mapping({'name': 'servo axis', 'joints': [joint]}),
+        Recording('servo axis', JointMotion(t, wanted[:, None]), Measurements(t, position)),
+        (),
+    )
 
 
 def sockets(data: Path, arm: str) -> Source:

@@ -20,9 +20,9 @@ from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
 from ..study import tabled
-from ..transfer.unseen import PLAIN, plain_fit, residual, tried
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
+from .unseen import PLAIN, plain_fit, residual, tried
 
 REPORTED = 0.5
 """Probability from which on a cause counts as reported: it is likelier right than wrong."""

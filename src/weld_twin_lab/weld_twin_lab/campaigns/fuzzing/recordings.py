@@ -23,7 +23,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
 
-from ...transfer.unseen import traceback_text
+from ...real_arms.unseen import traceback_text
 
 ROBOTS = ('slide', 'turn', 'planar', 'ur5', 'franka_panda', 'nine')
 ALIGNS = ('', 'base', 'tool', 'base,tool')

@@ -37,7 +37,7 @@ def run(study: Study) -> None:
     from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
     from ...real_arms.by_effort import folds, table
-    from ...transfer.unseen import ALIGN
+    from ...real_arms.unseen import ALIGN
 
     args = study.args
     if args.folds < 2:

@@ -3,7 +3,7 @@
 """Results hold tracebacks without the directories of the machine that made them."""
 
 import weld_twin_core as wt
-from weld_twin_lab.transfer.unseen import traceback_text
+from weld_twin_lab.real_arms.unseen import traceback_text
 
 
 def test_files_of_a_traceback_are_told_as_from_their_package_on():

@@ -9,8 +9,10 @@ import pytest
 from scipy.io import savemat
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.transfer.servo_axis import FILE, axis_recording, plain_axis
+from weld_twin_lab.real_arms.poor import plain_axis
+from weld_twin_lab.real_arms.sources import servo
 
+FILE = 'DATA_EMPS.mat'
 LAG = 6.5e-3
 
 
@@ -21,26 +23,28 @@ def published(tmp_path):
     reference = 0.1 * np.sin(1.3 * t)
     speed = 0.13 * np.cos(1.3 * t)
     measured = reference - LAG * speed - 5e-6 * np.sign(speed)
-    savemat(tmp_path / FILE, {'t': t, 'qg': reference, 'qm': measured})
+    (tmp_path / 'emps').mkdir()
+    savemat(tmp_path / 'emps' / FILE, {'t': t, 'qg': reference, 'qm': measured})
     return tmp_path
 
 
 def test_plain_models_leave_less_the_more_they_know(published):
-    left = plain_axis(axis_recording(published), 3600)
+    left = plain_axis(servo(published).recording, 3600)
     assert left['as given'] > 50.0 * left['lag'] > 50.0 * left['lag and sign']
     # A square wave without its fundamental, which the lag takes: sqrt(1 - 8 / pi^2) is left.
     assert left['lag'] == pytest.approx(5e-6 * np.sqrt(1.0 - 8.0 / np.pi**2), rel=0.1)
 
 
 def test_across_the_axis_everything_is_zero(published):
-    recording = axis_recording(published)
+    recording = servo(published).recording
     assert not recording.measured.position[:, :2].any()
     assert recording.joints.q.shape == (6000, 1)
 
 
 @pytest.mark.parametrize('content', [None, {'x': [1.0]}])
 def test_another_file_is_said_to_be_another(tmp_path, content):
+    (tmp_path / 'emps').mkdir()
     if content:
-        savemat(tmp_path / FILE, content)
+        savemat(tmp_path / 'emps' / FILE, content)
     with pytest.raises(DataError, match=FILE):
-        axis_recording(tmp_path)
+        servo(tmp_path)

@@ -1,9 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One split, diagnosed and fitted plainly, and what every model then does on other stations."""
+"""Recordings that are poor on purpose: does the diagnosis ever do worse than a plain fit?"""
 
 from __future__ import annotations
 
+from functools import lru_cache
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -17,12 +19,35 @@ from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 
 from ..blind.statistics import bootstrap
-from .splits import Split, halves
+from .sources import servo
+from .splits import Split, all_splits, halves
 from .unseen import ALIGN, PLAIN, flagged, plain_fit, residual, tried
 
 PRODUCT, FRAMES = 'product', 'frames'
 HALVES = 60
 """Stations from which on the two halves of a split are diagnosed as well."""
+AXIS, FITTED = 'servo_axis', 0.6
+"""The servo axis, and the share of its recording, from the beginning, that is fitted on."""
+
+
+@lru_cache(maxsize=1)
+def _splits(data: str) -> dict[str, Split]:
+    arms = (Path(data) / f'{arm}_laser_tracker' for arm in ('ur5', 'ur10'))
+    return {split.name: split for split in all_splits(*arms)}
+
+
+def names(data: str) -> list[str]:
+    """
+    Return what can be judged: forty splits of two measured arms, and a servo axis.
+
+    data: directory with the sources.
+    """
+    return [*_splits(data), AXIS]
+
+
+def judged(data: str, name: str) -> dict[str, Any]:
+    """Return what came of one of `names`, as plain JSON values."""
+    return _axis(data) if name == AXIS else judge(_splits(data)[name])
 
 
 def judge(split: Split) -> dict[str, Any]:
@@ -100,6 +125,54 @@ def _region(
     rest = ~flags
     out['unflagged_over_frames'] = paired(mine[rest], frames[rest]) if rest.any() else None
     return out
+
+
+def _axis(data: str) -> dict[str, Any]:
+    """Return what is named of the axis, and what is left on the part not fitted on."""
+    source = servo(Path(data))
+    recording, robot = source.recording, source.robot
+    measured = recording.measured
+    assert measured is not None
+    cut = int(FITTED * measured.t.size)
+    rows = np.arange(measured.t.size)
+    train, test = (
+        recording.with_measured(measured.take(part)) for part in (rows < cut, rows >= cut)
+    )
+    out: dict[str, Any] = {'name': AXIS, 'kind': AXIS, 'robot': robot.name}
+    out['rms_m'] = plain_axis(recording, cut)
+    start = perf_counter()
+    diagnosis, error = tried(train, robot)
+    out |= {'seconds': round(perf_counter() - start, 2), 'traceback': error}
+    if diagnosis is None:
+        return out
+    out |= said(diagnosis)
+    out['found'] = [item.as_dict() for item in diagnosis.effects]
+    if diagnosis.status != 'unsound':
+        out['rms_m'][PRODUCT] = _rms(residual(diagnosis.model, train, test)[2])
+    return out
+
+
+def plain_axis(recording: Recording, cut: int) -> dict[str, float]:
+    """
+    Return the RMS error of plain models behind row ``cut``, fitted before it, [m].
+
+    As given; a lag, error proportional to speed; with the sign of the speed; with acceleration.
+    """
+    assert recording.measured is not None
+    t, q = recording.joints.t, recording.joints.q[:, 0]
+    error = recording.measured.position[:, 2] - q
+    speed = np.gradient(q, t)
+    columns = [speed, np.sign(speed), np.gradient(speed, t)]
+    out = {'as given': _rms(error[cut:])}
+    for k, name in enumerate(('lag', 'lag and sign', 'lag, sign and acceleration')):
+        design = np.stack([*columns[: k + 1], np.ones(q.size)], axis=1)
+        best = np.linalg.lstsq(design[:cut], error[:cut], rcond=None)[0]
+        out[name] = _rms(error[cut:] - design[cut:] @ best)
+    return out
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt((error**2).mean()))
 
 
 def paired(mine: Array, other: Array) -> dict[str, Any]:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.transfer.goals import measures
-from weld_twin_lab.transfer.judging import paired
-from weld_twin_lab.transfer.splits import LEAST, among, halves, kept_back, splits
+from weld_twin_lab.real_arms.goals import measures
+from weld_twin_lab.real_arms.poor import paired
+from weld_twin_lab.real_arms.splits import LEAST, among, halves, kept_back, splits
 
 
 @pytest.fixture(scope='module')

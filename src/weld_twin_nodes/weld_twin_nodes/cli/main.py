@@ -50,7 +50,7 @@ OLD = {
     'plan-measurement': 'investigate',
     'fleet': 'history',
     'blind': 'lab blind',
-    'real-robots': 'lab transfer',
+    'real-robots': 'lab real-arms',
     'benchmark': 'lab benchmark',
     'campaign': 'lab campaign',
 }

@@ -27,8 +27,8 @@ from weld_twin_msgs_py.files.whole_files import read_json, write_json
 
 OWN, FOR, AGAINST, BEGIN = 0.36, 0.89, -0.84, 0.82
 """What the log odds of an answer count, those of the other where it names the same, those where it
-names something else, and what is added. `weld-twin lab investigate --learn-from` learned them; docs/investigate.md
-says from which cells."""
+names something else, and what is added. `weld-twin lab investigate --learn-from` learned them;
+docs/investigate.md says from which cells."""
 CLOSED = 0.93
 """Probability from which an answer that two diagnoses were asked for closes the question. A judgement:
 of the 202 cells that the weights were learned from, each judged by weights learned from the others, from

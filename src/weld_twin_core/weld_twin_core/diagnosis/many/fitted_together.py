@@ -44,10 +44,6 @@ large to a tenth."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
-ROOM = 0.05
-"""Share of the rows that has to be left to tell noise by. Where dozens of errors take them all, of
-ten or eleven stations mostly, noise is learned as nothing, sizes count as nothing beside it, and
-stations that are left out are predicted by the fit that knew them."""
 
 
 def fitted_together(
@@ -65,13 +61,9 @@ def fitted_together(
     best, remaining = result, np.inf
     for less in _steps(result.problem, stations):
         trial = _together(result, exclude, less, beliefs, progress)
-        if _determined(trial) > (1.0 - ROOM) * trial.problem.size:
-            continue
         remains = unseen_rms(trial)
         if remains < beliefs.better * remaining:
             best, remaining = trial, remains
-    if best is result:
-        return result
     few = unseen_rms(result)
     if not (result.final.model.found or result.crowded) and _by_chance(result, best):
         return result
@@ -80,11 +72,6 @@ def fitted_together(
     if result.crowded or remaining < (1.0 if chosen else beliefs.better) * few:
         return best
     return replace(result, many=best) if remaining < CHOSEN * few else result
-
-
-def _determined(many: Search) -> float:
-    """Return how many numbers the data determine: every frame, and of errors what no prior does."""
-    return Unseen.of(many.problem, many.scale, many.final, many.precision).determined()
 
 
 def _by_chance(none: Search, many: Search) -> bool:

@@ -299,10 +299,6 @@ class Unseen:
         right = self._rights[b] @ mix if mix[1:].any() else self.rights_of_residual[b][:, 0]
         return np.asarray(right - self.pull)
 
-    def determined(self) -> float:
-        """Return how many coordinates the data determine rather than their prior."""
-        return float(np.clip(1.0 - self.precision * _spread(self._total), 0.0, 1.0).sum())
-
     def wandered(self) -> Array:
         """
         Return how far every effect's coordinates move as stretches are left out, shape (K,).

@@ -151,6 +151,7 @@ class Parameter:
         ----------
         numbers : tuple of 3 or 2 float
             In m instead of rad.
+        source : str
 
         """
         return replace(self, sliding=Plausible.of(numbers, source))
@@ -214,6 +215,7 @@ class View:
 
         Parameters
         ----------
+        more : mappings of channel to array
         keep_frames : bool
             The displacement moves no frame, so frames already worked out stay as they are.
 

@@ -88,6 +88,8 @@ def model(
 
     Parameters
     ----------
+    study : Study
+    tolerances : sequence of Tolerance
     exact : bool
         Run every draw exactly.
     seed : int
@@ -146,6 +148,7 @@ def exact_deviations(study: Study, tolerances: Sequence[Tolerance], draws: Array
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance, length P
     draws : array, shape (D, P)
         In the units of the tolerances.

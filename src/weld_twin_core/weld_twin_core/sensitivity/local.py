@@ -163,6 +163,7 @@ def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSen
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance
         Slopes are taken at no error; the forward difference uses the typical size.
 
@@ -240,7 +241,14 @@ class Posture:
 
 
 def posture(study: Study) -> Posture:
-    """Return condition number, manipulability and largest gain along a seam."""
+    """
+    Return condition number, manipulability and largest gain along a seam.
+
+    Parameters
+    ----------
+    study : Study
+
+    """
     motion = study.recording.joints
     q = motion.q if study.at is None else motion.at(study.at)[0]
     strength = np.linalg.svd(jacobian(study.robot, q)[..., :3, :], compute_uv=False)

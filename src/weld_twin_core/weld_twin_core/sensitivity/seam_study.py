@@ -78,6 +78,8 @@ def planned_study(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
     profile : Profile or str
         A time law, or the name of one with its default numbers.
     points : int
@@ -110,6 +112,8 @@ def study_of_plan(robot: Robot, planned: Plan, known: tuple[Effect, ...] = ()) -
 
     Parameters
     ----------
+    robot : Robot
+    planned : Plan
     known : tuple of Effect
         Effects believed to act.
 
@@ -133,10 +137,13 @@ def recorded_study(
 
     Parameters
     ----------
+    robot : Robot
+    recording : Recording
     points : int
         At most as many as there are measurements, or joint states without any.
     normal : array, shape (3,), optional
         Direction out of the work; left out, against the tool's z at every sample.
+    known : tuple of Effect
 
     Raises
     ------
@@ -165,6 +172,14 @@ def _away(rotation: Array, tangent: Array) -> Array:
 
 
 def with_known(study: Study, known: tuple[Effect, ...]) -> Study:
-    """Return the study counted from a twin with other known effects."""
+    """
+    Return the study counted from a twin with other known effects.
+
+    Parameters
+    ----------
+    study : Study
+    known : tuple of Effect
+
+    """
     nominal = Twin(study.robot, known).poses(study.recording, study.at)
     return replace(study, known=known, nominal=nominal)

@@ -100,6 +100,7 @@ def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
         At least 20.
     inputs : int
         Number of tolerances.
+    seed : int
 
     Raises
     ------

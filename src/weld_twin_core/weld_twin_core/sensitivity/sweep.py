@@ -75,6 +75,7 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
     Parameters
     ----------
+    study : Study
     tolerance : Tolerance
         Says which parameter of which effect.
     values : array, shape (V,)
@@ -90,6 +91,7 @@ def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name:
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance
         All of one unit.
     values : array, shape (V,)
@@ -121,6 +123,7 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     Parameters
     ----------
+    tolerance : Tolerance
     count : int
         How many sizes, evenly spread.
 
@@ -138,6 +141,8 @@ def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -
 
     Parameters
     ----------
+    study : Study
+    tolerance : Tolerance
     largest : float
         Where the search ends, in the unit of the parameter.
 
@@ -183,6 +188,7 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
 
     Parameters
     ----------
+    study : Study
     sizes : Sizes, optional
         Left out, those of the paper.
 
@@ -206,6 +212,7 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
 
     Parameters
     ----------
+    study : Study
     deviations : array, shape (..., N, 3) [m]
 
     """

@@ -41,12 +41,25 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
 
     To first order in the scatter, about the mean of every error.
 
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+
     """
     return _Scatter.of(study.known, tolerances).deviation(study)
 
 
 def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
-    """Return the root of the expected squared deviation over the arc length [m]."""
+    """
+    Return the root of the expected squared deviation over the arc length [m].
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+
+    """
     return rms_over_arc(study, expected_deviation(study, tolerances))
 
 
@@ -115,6 +128,9 @@ def compare_profiles(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
     profiles : sequence of str
         Names of time laws.
     points : int
@@ -231,12 +247,16 @@ def advise(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
     torch : Torch, optional
         As given; left out, upright on the seam.
     room : Room, optional
         How far the base may move, and how much room the arm must keep.
     tries : int
         Placements in the sample; the simplex search may take as many again for each free value.
+    seed : int
 
     Raises
     ------

@@ -125,6 +125,17 @@ def test_with_a_damaged_list_nothing_is_ours(tmp_path, weld_twin, program, damag
     assert (out / 'bracket.src').read_text() == '; my own\n'
 
 
+@pytest.mark.parametrize(('size', 'ours'), [(49_000_000, True), (51_000_000, False)])
+def test_a_list_of_more_than_50_megabytes_is_none(tmp_path, size, ours):
+    out = tmp_path / 'out'
+    make(out, **{'a.txt': '1'})
+    with open(out / LIST, 'a') as file:
+        file.write(' ' * size)
+    with suppress(DataError):
+        make(out, **{'a.txt': '2'})
+    assert (out / 'a.txt').read_text() == ('2' if ours else '1')
+
+
 def test_links_are_followed_and_never_replaced(weld_twin, program, tmp_path):
     real, link, ahead = tmp_path / 'disk/here', tmp_path / 'better', tmp_path / 'later'
     real.mkdir(parents=True)

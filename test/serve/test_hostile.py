@@ -10,11 +10,10 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from served import Person, Server, drop, fill, form, small_disk
+from served import Person, Server, drop, fill, small_disk
 
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.main import parser_of
-from weld_twin_report.serve.access import _without_token
 from weld_twin_report.serve.fields import CORRECT, DIAGNOSE, given, sentence, words
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
@@ -99,62 +98,6 @@ def test_names_as_people_give_them_are_taken_and_no_place_of_the_server_is_told(
     text = person.end_of(address)
     assert 'It could not be diagnosed' in text
     assert '/tmp' not in text and 'jobs' not in text and '--' not in text.split('</style>')[1]
-
-
-@pytest.mark.parametrize(
-    'name', ['.csv', '-o.csv', 'a\u202egnp.csv', 'a\nb.csv', f'{"x" * 250}.csv']
-)
-def test_names_that_hide_something_are_not(server, name):
-    assert drop(server, files=[(name, TABLE)])[0] in (400, 422)
-
-
-def test_a_key_lasts_a_year_and_leads_to_ones_own_from_elsewhere(server):
-    first, second = Person(server), Person(server)
-    first.get()
-    (cookie,) = first.jar
-    assert 360 * 86_400 < cookie.expires - time.time() < 370 * 86_400
-    _, address, _ = first.drop(files=[('a.csv', TABLE)])
-    first.end_of(address)
-    second.get()
-    assert second.get(address)[0] == 404
-    assert second.drop('/me', key='0' * 64, files=())[0] == 422
-    assert second.drop('/me', key=f' {cookie.value} ', files=())[1] == '/recordings'
-    assert second.get(address)[0] == 200
-    # Nobody makes up a key: another one than those given out is none.
-    made_up = Person(server)
-    made_up.jar.set_cookie(cookie)
-    next(iter(made_up.jar)).value = cookie.value[:-1] + ('0' if cookie.value[-1] != '0' else '1')
-    made_up.get()
-    assert next(iter(made_up.jar)).value[:8] != cookie.value[:8] or made_up.get(address)[0] == 404
-
-
-@pytest.fixture(scope='module')
-def guarded(tmp_path_factory):
-    """A server that others can reach, and that takes small files alone."""
-    place = tmp_path_factory.mktemp('guarded')
-    made = Server(place, '--host', '127.0.0.2', '--upload', '0.0001')
-    made.place, made.token = place, made.address.partition('?token=')[2]
-    yield made
-    made.kill()
-
-
-def test_a_token_is_needed_where_others_can_come_and_uploads_are_bounded(guarded):
-    assert guarded.token
-    assert guarded.get('/')[0] == guarded.get('/?token=wrong')[0] == 401
-    told = {'Authorization': f'Bearer {guarded.token}'}
-    assert guarded.get('/', **told)[0] == 200
-    body, kind = form(files=[('big.mcap', bytes(200_000))])
-    assert guarded.get('/recordings', data=body, Content_Type=kind, **told)[0] == 413
-    assert list((guarded.place / 'jobs').iterdir()) == []
-
-
-def test_a_token_does_not_stay_in_the_address_and_a_wrong_one_harms_nobody(guarded):
-    person, token = Person(guarded), guarded.token
-    assert person.get('/recordings?token=wrong')[0] == 401
-    assert person.get(f'/recordings?token={token}&x=1')[:2] == (200, '/recordings?x=1')
-    assert person.get('/recordings?token=wrong')[:2] == (200, '/recordings')
-    assert person.get('/')[0] == 200
-    assert _without_token('//evil.example/', f'token={token}') == '/evil.example/'
 
 
 def test_a_full_disk_and_damaged_jobs_cost_nothing_that_was_there(tmp_path):

@@ -85,7 +85,7 @@ def app(tmp_path):
     from weld_twin_report.serve.app import make_app
     from weld_twin_report.serve.queue import Queue
 
-    settings = Settings(tmp_path, names=('cell.example',), token='right', workers=0, upload=3000,
+    settings = Settings(tmp_path, names=('cell.example',), token='right', workers=0, upload=8000,
                         own=3, proxy=True)  # fmt: skip
     queue = Queue(settings)
     yield make_app(settings, queue, Doors())
@@ -107,12 +107,21 @@ def test_who_is_let_in(app, kept):
         who.ask('/me', b'key=x', FORM, origin='http://evil.example'),
         who.ask('/me', b'key=x', FORM, origin='http://localhost:8765'),
         who.ask('/me', b'key=x', FORM, sec_fetch_site='cross-site'),
-        who.ask('/nothing/here'),
+        who.ask('/me', b'key=x', FORM, origin='null'),
+        *map(
+            who.ask,
+            (
+                '/nothing/here',
+                '/docs',
+                '/recordings/../../etc/passwd',
+                '/recordings/0/../job.json',
+            ),
+        ),
     ]
     kept('let_in', '\n\n'.join(said) + '\n')
 
 
-def test_what_is_dropped_waits_and_is_seen_by_nobody_else(app, kept):
+def test_what_is_dropped_waits_and_is_seen_by_nobody_else(app, tmp_path, kept):
     one, other = (Visitor(app, authorization='Bearer right') for _ in range(2))
     said = [one.ask('/recordings'), one.ask('/recordings', *form(files=TABLE, align='base'))]
     mine = one.last
@@ -122,7 +131,7 @@ def test_what_is_dropped_waits_and_is_seen_by_nobody_else(app, kept):
         one.ask('/recordings', *form(robot='no_robot', files=TABLE)),
         one.ask('/recordings', *form(files=())),
         one.ask('/recordings', *form(files=TABLE, tolerance='-1')),
-        one.ask('/recordings', *form(files=(('data.csv', b'x' * 4000),))),
+        one.ask('/recordings', *form(files=(('data.csv', b'x' * 9000),))),
         one.ask('/recordings', *form(files=(('data.exe', b'x'),))),
         one.ask(f'{mine}/report.html'),
         one.ask(f'{mine}/again', *form(files=(), robot='ur10')),
@@ -139,6 +148,23 @@ def test_what_is_dropped_waits_and_is_seen_by_nobody_else(app, kept):
         one.ask(mine),
     ]
     kept('dropped', '\n\n'.join(said) + '\n')
+    assert len(list((tmp_path / 'jobs').iterdir())) == 3  # nothing is left of what was refused
+
+
+NO_RECORDINGS = (
+    {'files': ()}, {'files': [('x.exe', b'MZ')]}, {'files': [('a.csv', b''), ('A/a.csv', b'')]},
+    {'files': [('metadata.yaml', b'')]}, {'files': [(f'{k}.mcap', b'') for k in range(30)]},
+    {'robot': '/etc/passwd'}, {'align': '--out'}, {'region': '../secret'}, {'at': 'Monday'},
+    *({'files': [(name, b'a,b\n')]}
+      for name in ('.csv', '-o.csv', 'a\u202egnp.csv', 'a\nb.csv', f'{"x" * 250}.csv')),
+)  # fmt: skip
+
+
+def test_what_is_no_recording_is_refused_in_a_sentence(app, tmp_path, kept):
+    one = Visitor(app, authorization='Bearer right')
+    said = [one.ask('/recordings', *form(**how)).splitlines()[:11] for how in NO_RECORDINGS]
+    kept('no_recordings', '\n\n'.join('\n'.join(lines) for lines in said) + '\n')
+    assert not list((tmp_path / 'jobs').iterdir())
 
 
 def test_who_one_is_goes_along_with_a_key(app, kept):
@@ -146,6 +172,9 @@ def test_who_one_is_goes_along_with_a_key(app, kept):
                   for address in ('127.0.0.1', '10.0.0.2'))  # fmt: skip
     said = [one.ask('/recordings', *form(files=TABLE)), one.ask('/me'), one.ask('/history')]
     key = one.cookies['weld_twin_user']
+    made_up = Visitor(app, authorization='Bearer right')
+    made_up.cookies['weld_twin_user'] = key[:-1] + ('0' if key[-1] != '0' else '1')
+    assert 'None yet' in made_up.ask('/recordings') and made_up.cookies['weld_twin_user'] != key
     said += [
         other.ask('/me', b'key=' + b'0' * 64, FORM),
         other.ask('/me', f'key= {key.upper()} '.encode(), FORM),

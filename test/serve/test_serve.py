@@ -13,7 +13,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
-from served import Person, Server, drop, fill, form, small_disk, until
+from served import Person, Server, fill, small_disk, until
 
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database
@@ -331,40 +331,6 @@ def after(true, seconds=60.0):
     while not true():
         assert time.monotonic() < until
         time.sleep(0.02)
-
-
-def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):
-    assert server.get('/')[0] == 200
-    assert server.get('/', Host='evil.example')[0] == 403
-    body, kind = form()
-    for headers in (
-        {'Origin': 'http://evil.example'},
-        {'Origin': 'null'},
-        {'Sec_Fetch_Site': 'cross-site'},
-    ):
-        assert server.get('/recordings', data=body, Content_Type=kind, **headers)[0] == 403
-    assert server.get('/recordings/../../etc/passwd')[0] == 404
-    assert server.get('/recordings/0/%2e%2e%2fjob.json')[0] == 404
-    assert server.get('/docs')[0] == 404
-
-
-@pytest.mark.parametrize(
-    ('how', 'said'),
-    [
-        ({'files': ()}, 'Choose a recording first'),
-        ({'files': [('x.exe', b'MZ')]}, 'neither a bag, a table nor a robot file'),
-        ({'files': [('a.csv', b''), ('A/a.csv', b'')]}, 'same name'),
-        ({'files': [('metadata.yaml', b'')]}, 'No recording is among these'),
-        ({'files': [(f'{k}.mcap', b'') for k in range(30)]}, ''),
-        ({'robot': '/etc/passwd'}, 'is none of those bundled'),
-        ({'align': '--out'}, '“What is not known?” cannot be'),
-        ({'region': '../secret'}, '“Where it matters” cannot be'),
-        ({'at': 'Monday'}, 'is no date'),
-    ],
-)
-def test_what_is_no_recording_is_refused_in_a_sentence(server, how, said):
-    status, text = drop(server, **how)
-    assert status in (400, 422) and said in text
 
 
 def test_a_kill_loses_no_verdict_and_what_waited_goes_on(tmp_path, chromium):

@@ -113,18 +113,6 @@ def test_taught_points_from_a_table_are_visited(weld_twin, tmp_path):
         assert np.linalg.norm(position - point, axis=1).min() < 3e-4
 
 
-def test_info_says_what_is_there_and_what_it_is_good_for(weld_twin, tmp_path, effects):
-    out = tmp_path / 'bag'
-    weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40, '--out', out)
-    result = weld_twin('bag', out)
-    assert result.code == 0
-    joints = next(line for line in result.out.splitlines() if line.startswith('/joint_states'))
-    assert joints.split()[1:3] == ['sensor_msgs/msg/JointState', 'joints']
-    assert '40' in joints.split()
-    assert 'usable for a diagnosis' in result.out
-    assert 'robot: ur5' in result.out
-
-
 def test_info_lists_the_bundled_robots(weld_twin):
     listed = weld_twin('bag', '--robots').out
     assert all(name in listed for name in catalog.names())
@@ -244,12 +232,3 @@ def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_p
     assert result.code == 2
     assert 'no measurement meets a pose of the twin' in result.err
     assert not (tmp_path / 'bag').exists()
-
-
-def test_info_tells_the_effects_in_words(weld_twin, tmp_path):
-    effect = '{effect: backlash, joint: elbow_joint, width: 5e-4}'
-    assert simulated_with(weld_twin, tmp_path, effect).code == 0
-    said = weld_twin('bag', tmp_path / 'bag').out
-    assert 'effects: backlash of elbow_joint (width 0.0005 rad)' in said
-    assert 'twin_effects: none' in said
-    assert '[' not in said.split('usable')[0].partition('note:')[2]

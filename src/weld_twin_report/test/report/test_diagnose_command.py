@@ -272,11 +272,6 @@ def _at(q):
     return JointMotion(np.zeros(1), q)
 
 
-def test_an_export_is_printed_where_no_file_is_named(offset_model, capsys):
-    assert run('export', offset_model, '--robot', 'ur5', '--format', 'offsets') == 0
-    assert f'elbow_joint,{OFFSET},rad,{np.degrees(OFFSET):.6f},deg' in capsys.readouterr().out
-
-
 def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, capsys):
     model = write_model(
         tmp_path / 'm.json',

@@ -74,9 +74,9 @@ def test_worse_is_by_more_than_both_allowances(before, found, expected):
 def test_nine_bounds_of_ten_pass_and_ten_of_ten_do_not():
     ten = [row() for _ in range(9)] + [row(worst_m=3e-5)]
     rows = [*ten, after('load changed')]
-    assert summary(rows, [CHANGE], OTHER, None)['passed']
-    assert not summary([row() for _ in range(10)], [CHANGE], OTHER, None)['passed']
-    told = table({**summary(rows, [CHANGE], OTHER, None)})
+    assert summary(rows, [CHANGE], OTHER)['passed']
+    assert not summary([row() for _ in range(10)], [CHANGE], OTHER)['passed']
+    told = table({**summary(rows, [CHANGE], OTHER)})
     assert '9 of 10' in told
 
 
@@ -89,7 +89,7 @@ def test_a_goal_of_which_no_bound_is_told_counts_among_no_bounds():
 def test_bounds_that_fail_together_in_one_arm_are_counted_by_arms():
     sound = [row(arm=k) for k in range(9) for _ in range(4)]
     failing = [row(arm=9, worst_m=3e-5)] * 3 + [row(arm=9)]
-    found = summary([*sound, *failing], [], OTHER, None)
+    found = summary([*sound, *failing], [], OTHER)
     assert found['held'] == 37 / 40
     assert found['spread'] == {
         'arms': 10, 'all': 9, 'most': 9, 'fewer_than_half': 1, 'least': 0.25,
@@ -109,8 +109,8 @@ def test_bounds_that_fail_together_in_one_arm_are_counted_by_arms():
 )
 def test_one_miss_of_any_kind_fails_the_campaign(rows, changes, other):
     nine = [row() for _ in range(18)] + [row(worst_m=3e-5), row(worst_m=3e-5)]
-    assert summary(nine, [CHANGE], OTHER, None)['passed']
-    assert not summary(nine + rows, changes, other, None)['passed']
+    assert summary(nine, [CHANGE], OTHER)['passed']
+    assert not summary(nine + rows, changes, other)['passed']
 
 
 def test_whoever_goes_on_tries_what_is_missing_alone():

@@ -14,7 +14,6 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 from weld_twin_core.errors import TwinError
 from weld_twin_lab.campaigns.securing.keys import keystore
 from weld_twin_lab.campaigns.security import verdict
-from weld_twin_lab.cli.lab import proofs
 from weld_twin_nodes.cli.in_process import weld_twin
 
 TOPICS = {'/joint_states': 9, '/twin/tool_pose': 9}
@@ -54,13 +53,11 @@ def test_what_could_not_be_tried_is_not_passed():
     assert not verdict({'open': OPEN, 'reason': 'no keys'})
 
 
-def test_the_lab_has_the_proof():
-    assert 'security' in proofs()
-
-
 def test_a_folder_without_the_middleware_is_refused_with_what_to_fetch(tmp_path):
     out = tmp_path / 'security.json'
-    code, _, _ = weld_twin('lab', 'security', '--source', str(tmp_path), '--out', str(out))
+    code, _, _ = weld_twin(
+        'lab', 'campaign', 'security', '--source', str(tmp_path), '--out', str(out)
+    )
     assert code == 1
     assert json.loads(out.read_text())['reason'] == (
         f"open: '{tmp_path}' holds no rmw_cyclonedds_cpp: fetch the branch jazzy of "
@@ -82,7 +79,9 @@ def test_without_what_makes_keys_it_says_so(tmp_path):
     reason='sros2 is not here, and no wheel of it: no keys can be made; see --source',
 )
 def test_strangers_hear_and_say_nothing_under_enforced_security(tmp_path):
-    code, printed, _ = weld_twin('lab', 'security', '--out', str(tmp_path / 'security.json'))
+    code, printed, _ = weld_twin(
+        'lab', 'campaign', 'security', '--out', str(tmp_path / 'security.json')
+    )
     result = json.loads((tmp_path / 'security.json').read_text())
     if 'security libraries' in result['reason'] or 'unprotected' in result['reason']:
         pytest.skip(result['reason'])

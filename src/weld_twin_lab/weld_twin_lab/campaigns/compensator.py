@@ -3,8 +3,7 @@
 """Send drawn goals through a compensator in a cell, and change the cell under it.
 
 A diagnosis learns each of six arms with sure causes. Goals run as they are and through the compensator.
-Then a clock jumps, the load changes, the model is a wrong one, the tracker is lost. A stream of
-poses races a relay that copies them.
+Then a clock jumps, the load changes, the model is a wrong one, the tracker is lost.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from weld_twin_msgs_py.files import markdown
 from ..study import options, tabled
 from . import write_result
 from .compensating import NOTHING
-from .latency import pose_table
 
 if TYPE_CHECKING:
     from .compensating.drawn_cells import Arm
@@ -41,10 +39,6 @@ IN_A_CELL, WITHOUT = 24, 8
 told of one model."""
 APART = 1000
 """Between the seeds of the arms in cells and of those without."""
-SLOWER = 1.5
-"""Times the latency of a relay that copies which poses may take."""
-POSES = 500.0
-"""Poses a second in the race."""
 SIZES = ('before_m', 'after_m', 'best_m')
 """RMS distances of a goal [m]: as it is, corrected, and corrected by the true causes."""
 LARGEST = ('worst_m', 'bound_m')
@@ -57,14 +51,13 @@ OPTIONS = options(
 --without-cell N  goals of all arms that are judged without nodes, 0 for none [default: 500]
 --seed N          decides what is drawn [default: 7]
 --go-on           keep the goals and changes that the file has, and try the others
---turns N         turns of the race of poses, 0 for none [default: 20]
 """,
     out='',
 )
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return what became of every goal and of every change, and the race."""
+    """Return what became of every goal and of every change."""
     from .building.message_packages import messages_importable
 
     begun = time.monotonic()
@@ -77,7 +70,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
 
         def keep(said: str) -> None:
             tell(said)
-            results = _made(args, known, '', None)
+            results = _made(args, known, '')
             write_result(args.out, 'compensator', time.monotonic() - begun, results)
 
         for arm in unfinished(known, args.goals, args.seed):
@@ -86,20 +79,17 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             keep(f'{arm.name} {arm.seed}: {_in_words(arm.of(known.rows))}')
         other = other_arm(args.seed)
         tell(other)
-        poses = race(args, tell)
         done = {row['arm'] for row in known.without}
         for arm in arms_of(args.without_cell, WITHOUT, args.seed + APART):
             if arm.seed not in done:
                 known.without.extend(judged(arm.name, arm.seed, WITHOUT))
                 keep(f'{len(known.without)} goals without a cell: {_in_words(known.without)}')
-    return _made(args, known, other, poses)
+    return _made(args, known, other)
 
 
-def _made(
-    args: argparse.Namespace, known: Known, other: str, poses: dict[str, Any] | None
-) -> dict[str, Any]:
+def _made(args: argparse.Namespace, known: Known, other: str) -> dict[str, Any]:
     """Return what goes into the file."""
-    results = summary(known.rows, known.changes, other, poses, known.without)
+    results = summary(known.rows, known.changes, other, known.without)
     return {**results, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
 
 
@@ -115,13 +105,6 @@ def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
         if sum(not row['after'] for row in arm.of(known.rows)) < IN_A_CELL
         or (arm.changed and arm.name not in changed)
     ]
-
-
-def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any] | None:
-    """Return how long poses take beside a relay that copies them; None without turns."""
-    from .compensating.pose_race import race as raced
-
-    return raced(args.turns, POSES, tell) if args.turns else None
 
 
 def _before(args: argparse.Namespace) -> Known:
@@ -205,7 +188,6 @@ def summary(
     rows: Sequence[dict[str, Any]],
     changes: Sequence[dict[str, Any]],
     other: str,
-    poses: dict[str, Any] | None,
     without: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:
     """Return what all of it comes to, and whether it passed."""
@@ -223,8 +205,6 @@ def summary(
         'model of another arm refused': other.startswith('exit code 2'),
         'bound holds': HELD[0] <= covered <= HELD[1],
     }
-    if poses is not None:
-        goals['poses in time'] = max(poses['ratio'].values()) <= SLOWER and not poses['lost']
     return {
         'passed': all(goals.values()),
         'reached': goals,
@@ -240,7 +220,6 @@ def summary(
         'after_a_change': after,
         'changes': list(changes),
         'other_arm': other,
-        'poses': poses,
     }
 
 
@@ -250,7 +229,7 @@ def _counted_by(key: str, rows: Sequence[dict[str, Any]]) -> dict[str, dict[str,
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return the tables of the page: the arms, the changes, the race of poses."""
+    """Return the tables of the page: the arms, and the changes."""
     arms = [*result['robots'].items(), ('all', result['totals'])]
     lines = [tabled(COLUMNS, arms), _changes(result)]
     more = result['without_cell']
@@ -258,9 +237,6 @@ def table(result: dict[str, Any]) -> str:
         arms = [*more['robots'].items(), ('all', more['totals'])]
         lines.append(tabled(COLUMNS, arms))
     lines.append(_spread(result))
-    poses = result['poses']
-    if poses is not None:
-        lines.append(pose_table(poses))
     return '\n\n'.join(lines)
 
 

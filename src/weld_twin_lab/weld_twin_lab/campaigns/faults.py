@@ -10,7 +10,6 @@ afterwards.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,7 @@ from weld_twin_msgs_py.files import markdown
 
 from ..study import options
 
-OPTIONS = options(
-    """
---only TEXT  faults whose names contain this
---part K/N   the K-th of N parts; what the file has of other faults is kept [default: 1/1]
-""",
-    out='',
-)
+OPTIONS = options('--only TEXT  faults whose names contain this', out='')
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -36,44 +29,13 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     from .faulting.scenes import SCENES
 
     everything = (*JOINT_FAULTS, *OTHER_FAULTS, *SCENES)
-    mine = [each for each in _part(everything, args.part) if args.only in each.name]
+    mine = [each for each in everything if args.only in each.name]
     with tempfile.TemporaryDirectory() as folder:
         made = _on_bench([each for each in mine if each not in SCENES], Path(folder), tell)
         made['scenes'] = _scenes([each for each in mine if each in SCENES], Path(folder), tell)
-    order = [each.name for each in everything]
-    result = _with_those_before(made, args, order)
-    rows = [*result['faults'], *result['scenes'], *result['bags'].values()]
-    refused = all(row['refused'] for row in result['parameters'])
-    return {'passed': refused and all(row['passed'] for row in rows), **result}
-
-
-def _part(everything: Sequence[Any], part: str) -> Sequence[Any]:
-    """Return the K-th of N parts of a list, told as K/N."""
-    from weld_twin_core.errors import DataError
-
-    k, _, n = part.partition('/')
-    if not (k.isdigit() and n.isdigit() and 1 <= int(k) <= int(n)):
-        raise DataError(f"--part takes K/N, such as 1/4, got '{part}'")
-    ends = [round(i * len(everything) / int(n)) for i in (int(k) - 1, int(k))]
-    return everything[ends[0] : ends[1]]
-
-
-def _with_those_before(
-    made: dict[str, Any], args: argparse.Namespace, order: Sequence[str]
-) -> dict[str, Any]:
-    """Return the rows of this run, and of an earlier one for all else, if it was a part."""
-    out = {**made, 'bags': {f'{args.part} {args.only}'.strip(): made.pop('bag')}}
-    file = Path(args.out)
-    if not file.exists() or (args.part == '1/1' and not args.only):
-        return {**made, 'bags': out['bags']}
-    before = json.loads(file.read_text(encoding='utf-8'))
-    for key in ('faults', 'scenes'):
-        rows = {row['fault']: row for row in (*before.get(key, ()), *made[key])}
-        out[key] = sorted(rows.values(), key=lambda row: order.index(row['fault']))
-    out['parameters'] = made['parameters'] or before['parameters']
-    out['bags'] = {**before.get('bags', {}), **out['bags']}
-    out.pop('bag', None)
-    return out
+    rows = [*made['faults'], *made['scenes'], made['bag']]
+    refused = all(row['refused'] for row in made['parameters'])
+    return {'passed': refused and all(row['passed'] for row in rows), **made}
 
 
 def _on_bench(faults: Sequence[Any], folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -187,13 +149,12 @@ def table(result: dict[str, Any]) -> str:
         for each in row['told']
         if each['within_s']
     ]
-    messages = sum(bag['messages'] for bag in result['bags'].values())
     refused = sum(row['refused'] for row in result['parameters'])
     return (
         markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows)
         + '\n'
         + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *scenes)
         + f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
-        f'sentence. The bags of the whole campaign have {messages:,} messages; all of them can be '
+        f'sentence. The bag has {result["bag"]["messages"]:,} messages; all of them can be '
         'read.\n'
     )

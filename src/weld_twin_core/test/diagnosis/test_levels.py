@@ -235,3 +235,20 @@ def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
     assert (told.causes[0].place[0][0], told.causes[0].dependence[0][0]) == ('instrument', 'place')
     assert told.unexplained.structure[0] == 'instrument, depending on place'
     assert sum(share for _, share in told.where.joints) < 0.5 * told.causes[0].share
+
+
+def test_how_a_set_up_moved_is_no_cause_of_its_own():
+    """An instrument whose scale comes and goes is placed over time; nothing moved at an instant."""
+    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(2)
+    t = 20.0 * np.arange(50)
+    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
+    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    position = wt.Twin(robot).poses(commanded, t).position + [2.1, -1.3, 0.4]
+    position *= (1.0 + 1.2e-4 * np.sin(2.0 * np.pi * t / 900.0))[:, None]
+    position += rng.normal(scale=3e-5, size=position.shape)
+    seen = commanded.with_measured(wt.Measurements(t, position))
+    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    assert any(effect.traits.of_setup and not effect.traits.bends for effect in found.model.found)
+    (cause,) = found.causes
+    assert cause.place[0][0] == 'base' and cause.dependence[0][0] == 'time'
+    assert [site.effect for site, _ in cause.name] == ['frame_curve']

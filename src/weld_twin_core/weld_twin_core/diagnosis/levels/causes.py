@@ -179,13 +179,19 @@ def _nameless(
         return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)
     by_curves = {at for members in held.values() for at in members}
     for k, effect in enumerate(model if curved is not None else ()):
-        if k not in taken | by_curves and not effect.traits.bends:
-            claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, {Site.of(effect): 1.0}))
+        if k in taken | by_curves or effect.traits.bends:
+            continue
+        if not effect.traits.cause and held.get(effect.at):
+            # How a set-up moved is nuisance, and no name beside the curves of that place.
+            held[effect.at] += (k,)
+            continue
+        name = {Site.of(effect): 1.0} if effect.traits.cause else {}
+        claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, name))
     for place, own in places.items():
         if not held[place]:
             remaining += own
             continue
-        curves = {Site.of(model[k]): 1.0 for k in held[place]}
+        curves = {Site.of(model[k]): 1.0 for k in held[place] if k in by_curves}
         levels = _place_of(place, own, beliefs), _dependence_of(own), curves
         share = float(sum(part.share for part in own))
         claims.append(_cause(held[place], *levels, share=share))

@@ -141,6 +141,28 @@ def test_a_turn_of_the_base_moves_the_tool_by_its_lever():
         pose_covariances(known, Twin(robot), still, np.zeros(1), setup=2)
 
 
+def test_a_joint_gives_when_it_is_accelerated_as_far_as_its_spring_lets_it():
+    """A turn of the first joint by a swing of 1 rad and 2 rad/s moves the tool by its lever."""
+    robot, give = load('ur5'), 3e-5
+    t = np.linspace(0.0, 3.0, 1501)
+    q = np.tile([0.0, -1.0, 1.2, -0.5, 0.3, 0.0], (t.size, 1))
+    q[:, 0] = np.sin(2.0 * t)
+    swing = Recording('swing', JointMotion(t, q))
+    at = np.array([0.5, 1.1, 2.3])
+    what = Directions((), 1, (), gives=robot.n)
+    covariance = np.zeros((robot.n, robot.n))
+    covariance[0, 0] = give**2
+    known = posterior(robot, what, covariance)
+    twin = Twin(robot)
+    sigma = np.sqrt(
+        np.trace(known.pose_covariance(Features(twin, swing, at))[:, :3, :3], axis1=1, axis2=2)
+    )
+    lever = np.linalg.norm(twin.poses(swing, at).position[:, :2], axis=1)
+    assert sigma == pytest.approx(give * 4.0 * np.abs(np.sin(2.0 * at)) * lever, rel=1e-3)
+    still = motion(robot)
+    assert not known.pose_covariance(Features(twin, still, still.joints.t)).any()
+
+
 def test_a_model_is_less_sure_the_farther_it_is_from_what_was_recorded():
     robot = load('ur5')
     narrow = tuple(((-0.5, 0.5),) for _ in range(6))

@@ -16,6 +16,8 @@ from .features import Features
 AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
 CURVE = 'curve of '
 """How the names of a curve's heights begin."""
+GIVE = 'give of '
+"""How the names of what a joint gives when it is accelerated begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,9 @@ class Directions:
     knots: tuple[Array, ...] = ()
     """For every joint, where the heights of a curve of its own angle are coordinates: straight
     lines between, nothing beyond [rad or m]. Evenly spaced; none for no curve."""
+    gives: int = 0
+    """Joints, counted from the base, of which it is a coordinate how far each stays behind for its own
+    acceleration [s^2]: a spring in the drive holds the inertia of all that it moves. All or none."""
 
     def __post_init__(self) -> None:
         knots = tuple(readonly(k, (None,), 'knots') for k in self.knots)
@@ -56,7 +61,12 @@ class Directions:
     @property
     def count(self) -> int:
         """Return the number of coordinates."""
-        return self.frame_count + sum(self.sizes) + sum(k.size for k in self.knots)
+        return self.frame_count + sum(self.sizes) + self.shapes
+
+    @property
+    def shapes(self) -> int:
+        """Return the number of coordinates that are no effect's: gives, then heights of curves."""
+        return self.gives + sum(k.size for k in self.knots)
 
     def names(self) -> list[str]:
         """
@@ -79,16 +89,16 @@ class Directions:
             if effect.traits.waves is not None:
                 parts = [f'{n:g} {of}' for n in effect.search.orders() for of in ('sin', 'cos')]
             out += [f'{effect.name}{where} {part}' for part in parts]
+        out += [f'{GIVE}joint {joint + 1}' for joint in range(self.gives)]
         for joint, knots in enumerate(self.knots):
             step = f' by {knots[1] - knots[0]:g}' if knots.size > 1 else ''
             out += [f'{CURVE}joint {joint + 1} at {place:.3f}{step}' for place in knots]
         return out
 
     def fitted(self) -> Array:
-        """Return the coordinates of the fitted model; those of frames and curves are zero."""
-        curves = sum(k.size for k in self.knots)
+        """Return the coordinates of the fitted model; those of no effect are zero."""
         own = [effect.fit.coordinates() for effect in self.effects]
-        return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
+        return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(self.shapes)])
 
     def columns(self, features: Features, setup: int) -> Array:
         """
@@ -109,6 +119,9 @@ class Directions:
             if effect.applicable(features.view, effect.site) is None:
                 out[here] = features.columns(effect, atoms=False)
         at = self.frame_count + sum(self.sizes)
+        for joint in range(self.gives):
+            out[at + joint] = -features.acceleration[:, joint] * features.column(('q', joint))
+        at += self.gives
         for joint, knots in enumerate(self.knots):
             if knots.size:
                 hats = _hats(features.run.view.joint(joint), knots)

@@ -77,6 +77,14 @@ class Features:
         """Return what effects with memory see: the joint stream on its own stamps."""
         return self.twin.joint_view(self.recording)
 
+    @cached_property
+    def acceleration(self) -> Array:
+        """Return how every joint is accelerated at the stamps, shape (M, n) [rad/s^2]; 0 at rest."""
+        motion = self.recording.joints
+        if motion.static or motion.t.size < 2:
+            return np.zeros((self.at.size, motion.q.shape[1]))
+        return self._picker.take(np.gradient(motion.velocity, motion.t, axis=0))
+
     def column(self, channel: Channel) -> Array:
         """Return d pose / d channel, shape (6, M)."""
         return self._columns(channel)

@@ -205,8 +205,7 @@ class Posterior:
         what = self.directions
         stays = [commandable(effect) for effect in what.effects]
         own = np.repeat(stays, what.sizes).astype(bool)
-        curves = sum(k.size for k in what.knots)
-        keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(curves, bool)])
+        keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(what.shapes, bool)])
         effects = tuple(e for e, stay in zip(what.effects, stays, strict=True) if stay)
         return replace(
             self,
@@ -222,8 +221,8 @@ class Posterior:
         Return the effects that predict best, and the posterior about them.
 
         What a diagnosis names is a few effects; most arms have a little of all others, and what the
-        recordings say of these is kept here. Frames go along. A parameter that bends the twin, and
-        the height of a curve, stay.
+        recordings say of these is kept here. Frames go along. A parameter that bends the twin, what a
+        joint gives when it is accelerated, and the height of a curve, stay.
 
         result: of the fitted model.
         """
@@ -484,6 +483,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         'setups': what.setups,
         'effects': [effect.to_mapping() for effect in what.effects],
         'knots': [knots.tolist() for knots in what.knots],
+        'gives': what.gives,
         'coordinates': coordinates,
         'covariance': _lower(posterior.covariance),
         **_single(posterior),

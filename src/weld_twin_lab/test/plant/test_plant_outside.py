@@ -86,6 +86,18 @@ def test_what_friction_holds_is_the_same_in_every_recording_where_it_is_given():
         assert np.allclose(first[:4], again, atol=1e-9) is alike
 
 
+def test_where_a_hose_hangs_is_the_same_in_every_recording_where_it_is_given():
+    whole = stations(UR5, 15)
+    part = replace(whole, t=whole.t[:4], q=whole.q[:4])
+    hose = {'effect': 'dress_pack', **CASES['dress_pack'], 'joint': 'j2'}
+    for given, alike in (({'middle': 0.1, 'reach': 1.5}, True), ({}, False)):
+        first, again = (
+            joint_displacement(UR5, [{**hose, **given}], command, 'j2')
+            for command in (whole, part)
+        )
+        assert np.allclose(first[:4], again, atol=1e-9) is alike
+
+
 def test_bearing_tilt_is_no_row_error():
     command = stations(UR5, 60)
     got = record(UR5, [{'effect': 'bearing_tilt', 'joint': 'j1', 'tilt': 1e-3}], command)

@@ -229,10 +229,11 @@ def _excluded(lot: Lot, rng: np.random.Generator) -> tuple[str, ...]:
 
 def one_arm(case: SealedCase) -> SealedCase:
     """
-    Return the case with what friction holds in a gear the same in every recording.
+    Return the case with the friction of a gear, and the place of a hose, alike in every recording.
 
-    The plant has it as a share of a recording's largest load where it is not given. Where there is no
-    load at all, rounding would decide on which flank the gear lies.
+    Where they are not given, the plant has the one as a share of a recording's largest load, and the
+    other by its range. Where there is no load at all, rounding would decide on which flank
+    the gear lies.
 
     Raises DataError: a joint with such play carries nothing.
     """
@@ -246,6 +247,9 @@ def one_arm(case: SealedCase) -> SealedCase:
             if most < NO_LOAD:
                 raise DataError(f'{cause["joint"]} carries nothing, so no load moves its play')
             cause = {**cause, 'torque': FLANK_TORQUE * most}
+        elif cause['effect'] == 'dress_pack':
+            own = command.q[:, robot.index(str(cause['joint']))]
+            cause = {**cause, 'middle': float(own.mean()), 'reach': float(np.ptp(own)) / 2.0}
         causes.append(cause)
     return replace(case, causes=causes)
 

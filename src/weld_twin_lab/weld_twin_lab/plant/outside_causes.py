@@ -76,7 +76,8 @@ def on_joints(
             sure = float(item.get('torque') or FLANK_TORQUE * np.abs(load).max()) + 1e-12
             out[:, i] += 0.5 * float(item['width']) * np.tanh(load / sure)
         else:
-            middle, reach = np.mean(q[:, i]), np.ptp(q[:, i]) / 2.0 + 1e-12
+            middle = float(item.get('middle', np.mean(q[:, i])))
+            reach = float(item.get('reach', np.ptp(q[:, i]) / 2.0)) + 1e-12
             out[:, i] -= float(item['amplitude']) * ((q[:, i] - middle) / reach) ** 3
     return out
 

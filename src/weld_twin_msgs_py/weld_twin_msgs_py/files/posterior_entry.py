@@ -46,6 +46,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         int(entry['setups']),
         effects_from_list(entry['effects'], robot),
         tuple(readonly(knots, (None,), 'posterior.knots') for knots in entry['knots']),
+        _gives(robot, entry.get('gives', 0)),
     )
     rest = entry['discrepancy']
     discrepancy = Discrepancy(
@@ -68,6 +69,13 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         _size(entry['sigma_anywhere_m'], 'sigma_anywhere_m'),
         middle=min(_size(entry.get('middle', 0.0), 'middle'), 1.0),
     )
+
+
+def _gives(robot: Robot, count: Any) -> int:
+    """Return for how many joints a give is a coordinate: all or none."""
+    if count not in (0, robot.n):
+        raise DataError(f'posterior.gives must be 0 or {robot.n}, got {count!r}')
+    return int(count)
 
 
 def _covariance(rows: Any, count: int) -> Array:

@@ -34,8 +34,9 @@ from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
+from .dispersion import dispersion
 from .leftover import Foretold, leftover, told_noise
-from .sizes import Prior, Rows, weighed, with_prior
+from .sizes import Prior, Rows, Weighed, weighed, with_prior
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
@@ -75,7 +76,11 @@ def allowed(
     fit = Fit(model, rows.residual)
     regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
     levers = _levers(problem, model, scale)
-    whole = models.mean, models.covariance
+    spread = models.covariance
+    # Of stations the discrepancy is as large as makes regions hold that others predict.
+    if not problem.at_rest:
+        spread = spread * _dispersion(rows, prior, models, regions.labels)
+    whole = models.mean, spread
     foretold = Foretold.of(regions, rows.columns, levers, system.given, whole)
     noise, turning = told_noise(problem, floor), ~np.asarray(model.robot.prismatic)
     lost = _lost(problem, model)
@@ -87,7 +92,7 @@ def allowed(
     posterior = Posterior(
         what,
         models.mean,
-        models.covariance,
+        spread,
         plausible_arm.discrepancy(model.robot, remaining, np.array(fine), model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
@@ -96,6 +101,12 @@ def allowed(
         middle=1.0,
     )
     return _with_usual_sigma(posterior, model, problem)
+
+
+def _dispersion(rows: Rows, prior: Prior, models: Weighed, labels: Array) -> float:
+    """Return by how much the covariance of the coordinates is too small for unseen regions of posture."""
+    given = [Conditioning(rows, prior, width, models.noise).given for width in models.drawn]
+    return dispersion(rows.columns, rows.residual, models.noise / rows.share, given, labels)
 
 
 def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
@@ -127,6 +138,7 @@ def _directions(problem: Problem, model: Model) -> Directions:
         len(problem.recordings),
         plausible_arm.directions(model.robot, model.found),
         plausible_arm.fine_knots([_joints(r) for r in problem.recordings]),
+        0 if problem.at_rest else model.robot.n,
     )
 
 
@@ -221,18 +233,18 @@ def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
 
 
 def _prior(what: Directions, model: Model) -> Prior:
-    """Return the prior of frames, effects and the heights of every joint's fine curve."""
+    """Return the prior of frames, effects, gives, and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
     group, gears = plausible_arm.groups(effects)
     sizes = [k.size for k in what.knots]
-    fine = sum(sizes)
-    curves = gears.size + np.repeat(np.arange(len(sizes)), sizes)
+    gives = np.full(what.gives, gears.size)
+    curves = gears.size + 1 + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
     return Prior(
-        np.concatenate([np.zeros(frames), tied, np.zeros(fine)]),
+        np.concatenate([np.zeros(frames), tied, np.zeros(what.shapes)]),
         plausible_arm.widths(model.robot, what),
-        np.concatenate([np.full(frames, -1), group, curves]).astype(int),
-        np.concatenate([gears, np.ones(len(sizes), bool)]),
+        np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
+        np.concatenate([gears, np.ones(1 + len(sizes), bool)]),
     )
 
 

@@ -35,6 +35,9 @@ hardly moved, where a gear's fine error looks like a slope that it is not; over 
 out."""
 FINE = 1e-4
 """Usual height of the fine curve [rad]: ripple of the orders above four."""
+GIVE = 3e-5
+"""Usual give of a joint for its own acceleration [s^2]: on a spring that swings at f it is
+1 / (2 pi f)^2, and joints of robots swing at 10 to 50 Hz."""
 MOST = 24
 """Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
 
@@ -117,7 +120,8 @@ def widths(robot: Robot, what: Directions) -> Array:
     """Return the standard deviation of every coordinate before the data, shape (P,)."""
     frames = np.tile(np.repeat(FRAME_WIDTHS, 3), what.frame_count // 6)
     fine = np.full(sum(knots.size for knots in what.knots), FINE)
-    return np.concatenate([frames, *(sizes(robot, effect) for effect in what.effects), fine])
+    own = [sizes(robot, effect) for effect in what.effects]
+    return np.concatenate([frames, *own, np.full(what.gives, GIVE), fine])
 
 
 def sizes(robot: Robot, effect: Effect) -> Array:

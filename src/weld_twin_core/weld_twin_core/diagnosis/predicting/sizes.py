@@ -50,6 +50,8 @@ USUAL = 0.3
 SWEEPS, LEARNING = 100, 20
 """Models drawn, and those until the chain has forgotten its start: on six sealed cells means of three
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
+KEPT = 20
+"""Every so many models one is kept."""
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
 
@@ -108,6 +110,8 @@ class Weighed(NamedTuple):
     a coordinate, and by variance, as it counts where they do not, shape (P,)."""
     noise: float
     """Variance of a row."""
+    drawn: tuple[Array, ...]
+    """Widths of the priors of some models, each shape (P,)."""
     rough: float
     """Share of the small errors that are of a usual size, among those of the geometry or those of
     the gears, whichever are rougher."""
@@ -121,9 +125,11 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     prior: what is known of the coordinates before.
     expected: variance of a row before anything is known.
     """
-    chain = _Chain(rows, prior, expected)
+    chain, drawn = _Chain(rows, prior, expected), []
     for sweep in range(SWEEPS):
         chain.step(look=sweep >= LEARNING)
+        if sweep >= LEARNING and sweep % KEPT == 0:
+            drawn.append(prior.width * chain.size)
     seen, width = chain.seen, prior.width
     mean = seen.mean / seen.count
     covariance = seen.square / seen.count - np.outer(mean, mean)
@@ -134,6 +140,7 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
         width * np.sqrt(seen.count / seen.precision),
         width * np.sqrt(seen.variance / seen.count),
         seen.noise / seen.count,
+        tuple(drawn),
         float(seen.usual.max() / seen.count),
     )
 

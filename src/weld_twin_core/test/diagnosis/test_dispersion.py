@@ -1,0 +1,51 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How much farther off regions are than models say: against draws whose dispersion is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.diagnosis.predicting.allowed import Conditioning
+from weld_twin_core.diagnosis.predicting.dispersion import dispersion
+from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows
+
+REGIONS, EACH, COUNT = 3, 150, 60
+"""Regions of posture, rows of each, and coordinates."""
+
+
+@pytest.mark.parametrize('true', [1.0, 3.0])
+def test_it_is_how_many_times_larger_the_variance_of_unseen_regions_is(true):
+    """Every region pulls the coordinates its own way, and by so much that the variance is so large."""
+    told = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        columns = rng.normal(size=(COUNT, REGIONS * EACH))
+        regions = np.repeat(np.arange(REGIONS), EACH)
+        truth = rng.normal(size=COUNT)
+        # A third of what a region alone leaves open: what the others leave open and what they are
+        # pulled by themselves make up the rest.
+        residual = truth @ columns + rng.normal(size=regions.size)
+        for region in range(REGIONS):
+            here = columns[:, regions == region]
+            open_ = np.linalg.cholesky(np.linalg.inv(here @ here.T))
+            own = np.sqrt((true - 1.0) / REGIONS) * open_ @ rng.normal(size=COUNT)
+            residual[regions == region] += own @ here
+        rows = Rows(columns, residual, 1.0)
+        prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), np.array([False]))
+        given = Conditioning(rows, prior, np.ones(COUNT), 1.0).given
+        told.append(dispersion(columns, residual, 1.0, [given], regions))
+    assert 0.6 * true < np.mean(told) < 1.6 * true
+
+
+def test_regions_that_say_nothing_leave_it_at_what_is_usual():
+    rng = np.random.default_rng(1)
+    columns, regions = 1e-9 * rng.normal(size=(COUNT, 80)), np.repeat(np.arange(8), 10)
+    residual = rng.normal(size=80)
+    rows = Rows(columns, residual, 1.0)
+    prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), np.array([False]))
+    given = Conditioning(rows, prior, np.ones(COUNT), 1.0).given
+    # A logarithm of standard deviation one half: its exponential has the mean e^(1/8).
+    told = dispersion(columns, residual, 1.0, [given], regions)
+    assert told == pytest.approx(np.exp(0.125), rel=0.01)

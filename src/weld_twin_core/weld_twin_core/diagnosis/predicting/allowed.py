@@ -104,7 +104,7 @@ def allowed(
 
 
 def _dispersion(rows: Rows, prior: Prior, models: Weighed, labels: Array) -> float:
-    """Return by how much the covariance of the coordinates is too small for unseen regions of posture."""
+    """Return by how much the covariance of the coordinates is too small for unseen postures."""
     given = [Conditioning(rows, prior, width, models.noise).given for width in models.drawn]
     return dispersion(rows.columns, rows.residual, models.noise / rows.share, given, labels)
 

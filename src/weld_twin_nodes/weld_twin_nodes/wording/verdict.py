@@ -154,7 +154,8 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
             first += '; what else is at work has no name.'
             return first, in_words(diagnosis.reasons[0], ())
         first += (
-            f', but {remaining} above the noise remains that no effect in the library explains.'
+            f', but {remaining} remains that no effect in the library explains; measuring noise alone '
+            f'is {millimetres(diagnosis.gap.noise_floor_m)}.'
         )
     else:
         first = f'No effect in the library{_without(diagnosis)} explains the gap of {size}.'

@@ -11,7 +11,7 @@ import diagnoses
 import pytest
 from rich.console import Console
 
-from weld_twin_core.diagnosis.result import Candidate, Site
+from weld_twin_core.diagnosis.result import Candidate, Site, Unexplained
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.wording.quantities import (
     millimetres,
@@ -20,6 +20,7 @@ from weld_twin_nodes.wording.quantities import (
     percent,
     uncertain,
 )
+from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_nodes.wording.words import cause, in_words, listed
 from weld_twin_report.report import print_summary
 
@@ -129,3 +130,12 @@ def test_no_probability_is_told_as_certain():
     assert plain(odds(1.0)) == '> 99 %'
     assert plain(odds(0.0)) == '< 1 %'
     assert plain(odds(0.6)) == '60 %'
+
+
+def test_what_remains_beside_a_name_is_not_told_as_above_the_noise_that_is_in_it():
+    case = diagnoses.backlash()
+    gap = replace(case.gap, noise_floor_m=4.1e-5)
+    remains = Unexplained(7.3e-5, above_noise=True)
+    told, _ = verdict(replace(case, status='unknown', gap=gap, unexplained=remains))
+    words = '0.073 mm remains that no effect in the library explains; measuring noise alone is 0.041 mm'
+    assert words in plain(told)

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One way to run a study: its options, its parts and tasks, what is kept of them, and how it ends.
+One way to run a study: its options, its tasks, what is kept of them, and how it ends.
 
 A study is a subcommand: a module with a docstring, whose first line is the short help, and::
 
@@ -10,8 +10,8 @@ A study is a subcommand: a module with a docstring, whose first line is the shor
     @study
     def run(study: Study) -> bool | None: ...
 
-What is slow to import is imported inside. Parts and tasks are kept in the folder of the study as soon
-as they are there, so that one that was stopped goes on.
+What is slow to import is imported inside. Tasks are kept in the folder of the study as soon as they are
+there, so that one that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -32,10 +32,9 @@ import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
-from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.cli.options import POOL
 from weld_twin_nodes.cli.parsing import Options
-from weld_twin_nodes.offline.output_directory import LIST, write_owned
+from weld_twin_nodes.offline.output_directory import write_owned
 
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner, Task
@@ -50,8 +49,6 @@ MISSED = 1
 """Exit code where a goal was not met."""
 DONE = 'done'
 """Folder of what is kept of the tasks of a study, with a folder of each engine that did them."""
-Tell = Callable[[str], None]
-"""Told what is being done."""
 
 
 def options(
@@ -70,27 +67,6 @@ def options(
 def listed(text: str) -> list[str]:
     """Return what stands between commas."""
     return [part.strip() for part in text.split(',') if part.strip()]
-
-
-class Parts:
-    """
-    The parts of a study, a file each.
-
-    folder: made where it is not there.
-    tell: told the name of each part that is made.
-    """
-
-    def __init__(self, folder: Path, tell: Tell = lambda text: None) -> None:
-        self._folder, self._tell = folder, tell
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def __call__(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return one part, from its file where there is one; else made, and kept."""
-        path = self._folder / f'{name}.json'
-        if not path.is_file():
-            self._tell(name)
-            write_text(path, json.dumps(make(), indent=1, default=float) + '\n')
-        return json.loads(path.read_text(encoding='utf-8'))
 
 
 class Study:
@@ -117,10 +93,6 @@ class Study:
     def tell(text: str) -> None:
         """Tell on stderr what is being done."""
         print(text, file=sys.stderr, flush=True)
-
-    def parts(self, folder: str) -> Parts:
-        """Return its parts, made one after the other and kept in a folder of it."""
-        return Parts(self.out / folder, self.tell)
 
     @contextmanager
     def runner(self, what: str, store: Path | None = None) -> Iterator[Runner]:
@@ -161,20 +133,6 @@ class Study:
         if page is not None:
             write_owned(self.out / f'{name}.md', page)
             print(page if say else '', end='')
-
-    def refuse_foreign(self, *ours: str) -> None:
-        """
-        Refuse a folder that holds something else than this study.
-
-        Raises
-        ------
-        DataError
-            It holds another name than ``ours``, or is no folder.
-
-        """
-        out, ours = self.out, (*ours, LIST)
-        if out.exists() and not (out.is_dir() and all(p.name in ours for p in out.iterdir())):
-            raise DataError(f"'{out}' holds something else already; choose another place")
 
 
 def engine_digest() -> str:

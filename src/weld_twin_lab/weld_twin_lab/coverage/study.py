@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,81 +16,65 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
+from weld_twin_nodes.offline.task_pool import Task
 
 from ..programs.cells import CELLS
 from ..real_arms.splits import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
-from ..study import Parts, require_simulator
+from ..study import require_simulator
 from .held import held
 from .others import of_seam, of_touches, of_years
 from .planned import carried_out
 from .sealed import of_case, told_shrink
 
-NAME, PARTS = 'coverage', 'parts'
 APART = 10_000
 """How far apart the seeds of what is drawn by one number are."""
 UR5_NOISE = 2e-5
 """A GTS3800 is good to 15 um + 6 um/m, a metre or two away [m]."""
 
 
-class Wanted(NamedTuple):
-    """What is asked for."""
-
-    arms: tuple[Path, Path] | None
-    """Directories with the published tables of the UR5 and the UR10."""
-    seed: int
-    """Of all that is drawn."""
-    cases: int
-    seams: int
-    touches: int
-    cells: int
-    plans: int
-    """Sealed cases; seams of each language of programs; arms that touch things; cells that live
-    through years; plans that are carried out."""
+@lru_cache(maxsize=1)
+def _splits(ur5: str, ur10: str) -> dict[str, Split]:
+    return {split.name: split for split in all_splits(Path(ur5), Path(ur10))}
 
 
-def entries_of(wanted: Wanted, part: Parts) -> list[dict[str, Any]]:
+def tasks_of(args: Any) -> list[Task]:
     """
-    Return what every promise came to.
+    Return what is to be tried, in the order that it is told.
 
-    part: keeps every recording's result.
+    args: the options of the study.
 
     Raises DataError: data are missing or cannot be read, or the simulator is not there.
     """
-    if any(wanted[2:]):
+    seed, asked = args.seed, list[tuple[str, Callable[..., Any], tuple[Any, ...]]]()
+    for name in _splits(args.ur5, args.ur10) if args.ur5 else ():
+        asked.append((name, _of_split, (args.ur5, args.ur10, name)))
+    arms = len(asked)
+    asked += [(f'case {k}', of_case, (seed, k)) for k in range(args.cases)]
+    asked += [
+        (f'{language} {k}', of_seam, (language, seed, k))
+        for k in range(args.seams)
+        for language in CELLS
+    ]
+    asked += [(f'touches {k}', of_touches, (APART * seed + k,)) for k in range(args.touches)]
+    asked += [(f'years {k}', of_years, (seed, k)) for k in range(args.cells)]
+    asked += [(f'plan {k}', carried_out, (APART * seed + k,)) for k in range(args.plans)]
+    if len(asked) > arms:
         require_simulator()
-    entries = [part(name, partial(_simulated, make)) for name, make in _asked(wanted)]
-    return [entry for entry in entries if entry is not None]
+    return [Task(simulated, (make, given), label) for label, make, given in asked]
 
 
-def _simulated(make: Callable[[], Any]) -> Any:
+def simulated(make: Callable[..., Any], given: tuple[Any, ...]) -> Any:
     """Return what is made; None where the plant's springs are too stiff to be simulated."""
     try:
-        return make()
+        return make(*given)
     except FloatingPointError:
         return None
 
 
-def _asked(wanted: Wanted) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Yield the name of every part, and what makes it."""
-    seed = wanted.seed
-    for split in all_splits(*wanted.arms) if wanted.arms else ():
-        yield split.name, partial(_of_split, split)
-    for k in range(wanted.cases):
-        yield f'{seed}_{k:04d}', partial(of_case, seed, k)
-    for k in range(wanted.seams):
-        for language in CELLS:
-            yield f'{seed}_{language}_{k:03d}', partial(of_seam, language, seed, k)
-    for k in range(wanted.touches):
-        yield f'{seed}_touches_{k:04d}', partial(of_touches, APART * seed + k)
-    for k in range(wanted.cells):
-        yield f'{seed}_years_{k:03d}', partial(of_years, seed, k)
-    for k in range(wanted.plans):
-        yield f'{seed}_plan_{k:03d}', partial(carried_out, APART * seed + k)
-
-
-def _of_split(split: Split) -> dict[str, Any]:
+def _of_split(ur5: str, ur10: str, name: str) -> dict[str, Any]:
     """Return what the regions of one poor recording hold, inside and outside of it."""
+    split = _splits(ur5, ur10)[name]
     group = 'tuned on' if split.robot == 'ur5' and split.kind in TUNED_ON else 'unseen'
     entry: dict[str, Any] = {'name': split.name, 'source': split.robot, 'group': group}
     found = _tried(lambda: diagnose([split.train], catalog.load(split.robot), align=ALIGN), entry)

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from weld_twin_msgs_py.files.markdown import table
+
+from ..study import tabled
 
 Entry = dict[str, Any]
 REGIONS = ('inside', 'outside')
@@ -118,74 +121,54 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
 
 def summary_table(entries: Sequence[Entry]) -> str:
     """Return the table of `summaries`."""
-    rows = [
-        [
-            s['source'],
-            s['group'],
-            s['region'],
-            str(s['recordings']),
-            f'{s["held"]:.1%}',
-            f'{s["held_of_all_poses"]:.1%}',
-            f'{s["worst"]:.0%}',
-            f'{s["flagged"]:.1%}',
-            *('' if s[k] is None else f'{s[k]:.2f}' for k in ('over_oracle', 'over_formal')),
-        ]
-        for s in summaries(entries)
-    ]
-    heads = (
-        'of',
-        'group',
-        'poses',
-        'recordings',
-        'held',
-        'of all poses',
-        'worst',
-        'flagged',
-        'width over the oracle',
-        'over its formal one',
-    )
-    return table(heads, *rows)
+    return tabled(SUMMARIES, summaries(entries))
 
 
 def entry_table(entries: Sequence[Entry]) -> str:
     """Return the table of every recording and region."""
-    rows = []
-    for entry in entries:
-        for region in REGIONS:
-            if region in entry:
-                rows.append(_row(entry, region))
-    heads = (
-        'recording',
-        'status',
-        'poses',
-        'number',
-        'held',
-        'not flagged',
-        'flagged',
-        'mean error',
-        'sigma',
-    )
-    return table(heads, *rows)
+    rows = [(entry, region) for entry in entries for region in REGIONS if region in entry]
+    return tabled(ENTRIES, rows)
 
 
-def _row(entry: Entry, region: str) -> list[str]:
-    e = entry[region]
-    return [
-        str(entry['name']),
-        str(entry['status']),
-        region,
-        str(e['poses']),
-        _share(e['held']),
-        _share(e['held_unflagged']),
-        _share(e['flagged']),
-        _mm(e['mean_error_m']),
-        _mm(e['median_sigma_m']),
-    ]
+def _share(value: float | None, digits: int = 0) -> str:
+    return '' if value is None else f'{value:.{digits}%}'
 
 
-def _share(value: float | None) -> str:
-    return '' if value is None else f'{value:.0%}'
+def _of(key: str, tell: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return what tells a number of a recording in a region."""
+    return lambda row: tell(row[0][row[1]][key])
 
 
 def _mm(value: float | None) -> str:
     return '' if value is None else f'{value * 1e3:.3f} mm'
+
+
+def _wide(key: str) -> Callable[[Any], str]:
+    return lambda s: '' if s[key] is None else f'{s[key]:.2f}'
+
+
+SUMMARIES: dict[str, Callable[[Any], object]] = {
+    'of': itemgetter('source'),
+    'group': itemgetter('group'),
+    'poses': itemgetter('region'),
+    'recordings': itemgetter('recordings'),
+    'held': lambda s: _share(s['held'], 1),
+    'of all poses': lambda s: _share(s['held_of_all_poses'], 1),
+    'worst': lambda s: _share(s['worst']),
+    'flagged': lambda s: _share(s['flagged'], 1),
+    'width over the oracle': _wide('over_oracle'),
+    'over its formal one': _wide('over_formal'),
+}
+"""Columns of the table of summaries."""
+ENTRIES: dict[str, Callable[[Any], object]] = {
+    'recording': lambda row: row[0]['name'],
+    'status': lambda row: row[0]['status'],
+    'poses': itemgetter(1),
+    'number': _of('poses', str),
+    'held': _of('held', _share),
+    'not flagged': _of('held_unflagged', _share),
+    'flagged': _of('flagged', _share),
+    'mean error': _of('mean_error_m', _mm),
+    'sigma': _of('median_sigma_m', _mm),
+}
+"""Columns of the table of recordings, each with a region."""

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from weld_twin_core.errors import TwinError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.deck import lots
-from ..study import Tell, engine_digest, head, require_simulator
+from ..study import engine_digest, head, require_simulator
 from .goals import summary
 
 KINDS = ('single', 'double', 'triple')
@@ -24,7 +24,7 @@ BATCH = 8
 
 
 def investigated(
-    seed: int, wanted: int, runner: Runner, tell: Tell, *, minutes: float
+    seed: int, wanted: int, runner: Runner, tell: Callable[[str], None], *, minutes: float
 ) -> dict[str, Any]:
     """
     Investigate sealed cells that poor motions leave open.

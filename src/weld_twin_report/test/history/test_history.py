@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
-from datetime import datetime, timedelta, timezone
+from datetime import datetime, timezone
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_nodes.cli import main
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_report.history import Database, entry_of, observations
+from weld_twin_report.history import Database, entry_of
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -33,25 +33,6 @@ def diagnosed(elbow_found):
 @pytest.fixture
 def url(tmp_path):
     return str(tmp_path / 'history.db')
-
-
-def weekly(diagnosed, url, widths):
-    """Add the same diagnosis week after week, its play as it is told."""
-    first = entry_of(diagnosed, MONDAY)
-    place = first.names.index('backlash elbow_joint 0')
-    rng = np.random.default_rng(1)
-    # How the middle of what is allowed scatters when the noise is drawn anew.
-    known, axes = np.linalg.eigh(observations([first])[0].information()[0])
-    spread = first.covariance @ axes * np.sqrt(np.maximum(known, 0.0))
-    database = Database(url)
-    for week, width in enumerate(widths):
-        value = first.value + spread @ rng.normal(size=len(first.names))
-        value[place] += width - first.value[place]
-        entry = replace(
-            first, at=MONDAY + timedelta(weeks=week), recording=f'{week:064d}', value=value
-        )
-        assert database.add('line 3', entry)
-    database.close()
 
 
 def test_a_diagnosis_is_added_once_and_shown(diagnosed, url, capsys):
@@ -76,39 +57,6 @@ def test_what_is_read_is_what_was_written(diagnosed, url):
     for name in ('value', 'prior_std', 'covariance', 'tool'):
         np.testing.assert_array_equal(getattr(back, name), getattr(entry, name))
     assert (back.at, back.names, back.effects) == (entry.at, entry.names, entry.effects)
-
-
-def test_a_step_is_told_with_its_date_and_its_size(diagnosed, url, capsys):
-    weekly(diagnosed, url, [5e-4] * 5 + [8e-4] * 3)
-    assert main(['history', 'changed', '--cell', 'line 3', '--db', url, '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told['diagnoses'] == 8
-    (change,) = told['changes']
-    assert (change['effect'], change['joint'], change['kind']) == (
-        'backlash',
-        'elbow_joint',
-        'step',
-    )
-    assert change['date'] == '2026-04-06'
-    assert change['size'] == pytest.approx(3e-4, rel=0.1)
-    assert (
-        main(['history', 'changed', '--cell', 'line 3', '--db', url, '--since', '2026-05-01']) == 0
-    )
-    assert 'nothing changed by more than chance in 8 diagnoses' in capsys.readouterr().out
-
-
-def test_wear_has_a_date_at_which_it_reaches_the_limit(diagnosed, url, capsys):
-    weekly(diagnosed, url, 5e-4 + 2e-5 * np.arange(10))
-    words = ['history', 'changed', '--cell', 'line 3', '--db', url, '--limit', 'backlash=1.1e-3']
-    assert main([*words, '--json']) == 0
-    (change,) = json.loads(capsys.readouterr().out)['changes']
-    assert change['kind'] == 'trend'
-    ahead = change['forecast']
-    # 0.68 mrad now and 0.02 mrad a week: 21 weeks to 1.1 mrad.
-    assert ahead['weeks_5'] <= 21.5 and ahead['weeks_95'] >= 20.5
-    assert ahead['weeks'] == pytest.approx(21.0, abs=2.0)
-    assert main(words) == 0
-    assert 'reaches 1.1 mrad in' in capsys.readouterr().out
 
 
 def test_what_cannot_be_added_is_refused_in_a_sentence(diagnosed, url, tmp_path, capsys):

@@ -16,7 +16,6 @@ there, so that one that was stopped goes on.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import sys
@@ -25,13 +24,13 @@ from contextlib import contextmanager
 from functools import wraps
 from importlib.util import find_spec
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
+from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.cli.options import POOL
 from weld_twin_nodes.cli.parsing import Options
 from weld_twin_nodes.offline.output_directory import write_owned
@@ -75,7 +74,7 @@ class Study:
 
     Parameters
     ----------
-    args : argparse.Namespace
+    args : Given
         Its options.
 
     Attributes
@@ -85,7 +84,7 @@ class Study:
 
     """
 
-    def __init__(self, args: argparse.Namespace) -> None:
+    def __init__(self, args: Given) -> None:
         self.args = args
         self.out = Path(args.out or '')
 
@@ -175,16 +174,11 @@ def head(schema: str, **more: Any) -> dict[str, Any]:
     return {'schema': f'weld_twin/{schema}', 'version': __version__, **more}
 
 
-def study(run: Callable[[Study], bool | None]) -> Callable[[argparse.Namespace], int]:
+def study(run: Callable[[Study], bool | None]) -> Callable[[Given], int]:
     """Return the subcommand of a study; one that returns False has missed a goal."""
 
     @wraps(run)
-    def command(args: argparse.Namespace) -> int:
+    def command(args: Given) -> int:
         return MISSED if run(Study(args)) is False else 0
 
     return command
-
-
-def job(text: str | None, own: tuple[Options, ...]) -> SimpleNamespace:
-    """Return a job of a proof, as `add_command` takes it: what its help says, and its options."""
-    return SimpleNamespace(__doc__=text, OPTIONS=own)

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Run a proof: what weld_twin claims, one command each."""
+"""Runs a proof."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import argparse
 from importlib import import_module
 from pkgutil import iter_modules
 
-from weld_twin_nodes.cli.options import add_command
+from weld_twin_nodes.cli.parsing import Command, add_command
 
 from . import lab_jobs
 
@@ -23,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the proofs, each with its options."""
     places = parser.add_subparsers(required=True, metavar='PROOF', dest='proof', title='proofs')
     for name, path in proofs().items():
-        add_command(places, name, import_module(path))
+        proof = import_module(path)
+        options = getattr(proof, 'OPTIONS', None) or (proof.add_arguments,)
+        add_command(places, name, Command(str(proof.__doc__), options=options))
 
 
 def run(args: argparse.Namespace) -> int:

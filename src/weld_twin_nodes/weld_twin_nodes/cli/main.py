@@ -9,17 +9,16 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 
 from ..offline.environment import THREADS
-from .options import add_command
-from .parsing import Parser, short_help
+from .parsing import Command, Parser, add_command, short_help
 
 USAGE_ERROR = 2
 """Exit code where the user can do something about it."""
@@ -32,7 +31,7 @@ COMMANDS = {
     **dict.fromkeys(('history', 'iso9283', 'sensitivity', 'serve', 'demo'), REPORT),
     'lab': 'weld_twin_lab.cli',
 }
-"""Commands in the order of the help, and where each lies."""
+"""Commands in the order of the help, and the package whose `ROWS` say what each takes."""
 BEFORE = ('detect',)
 """Commands that make what another takes; the help of that one tells of them."""
 BRINGS = {'weld_twin_report': 'writes pages', 'weld_twin_lab': 'is a proof'}
@@ -103,10 +102,10 @@ def renamed(words: Sequence[str]) -> list[str]:
         return list(words)
     at = list(words).index(typed)
     out = [*words[:at], *OLD.get(typed, typed).split(), *words[at + 1 :]]
-    module = _module(out[at]) if out[at] in COMMANDS and len(out) > at + 1 else None
-    usual = getattr(module, 'USUAL', None)
-    if usual and out[at + 1] not in (*HELP, *_jobs(module)):
-        out.insert(at + 1, usual)
+    if out[at] in COMMANDS and len(out) > at + 1:
+        command = _row(out[at])
+        if command.usual and out[at + 1] not in (*HELP, *command.jobs):
+            out.insert(at + 1, command.usual)
     return out
 
 
@@ -149,35 +148,30 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
 
 def _add(subparsers: argparse._SubParsersAction[Parser], name: str, chosen: str) -> None:
     """Add a command; those that are not in use are listed only."""
+    command = _row(name)
     if name != chosen:
-        spec = find_spec(_path(name))
-        code = getattr(spec and spec.loader, 'get_code', lambda _: None)(_path(name))
-        subparsers.add_parser(name, help=short_help(str(code.co_consts[0]) if code else ''))
+        subparsers.add_parser(name, help=short_help(command.text))
         return
-    module = _module(name)
-    jobs = _jobs(module)
-    if not jobs:
-        add_command(subparsers, name, module).set_defaults(run=module.run)
-        return
-    text = (module.__doc__ or '').strip()
-    parser = subparsers.add_parser(name, help=short_help(text), description=text)
-    parser.example = module.EXAMPLE
-    places = parser.add_subparsers(required=True, metavar='JOB', title='jobs')
-    for word, job in jobs.items():
-        add_command(places, word, job).set_defaults(run=job)
+    parser = add_command(subparsers, name, command)
+    parser.set_defaults(run=partial(_run, name, 'run'))
+    if command.jobs:
+        places = parser.add_subparsers(required=True, metavar='JOB', title='jobs')
+        for word, job in command.jobs.items():
+            add_command(places, word, job).set_defaults(run=partial(_run, name, word))
 
 
-def _path(name: str) -> str:
-    return f'{COMMANDS[name]}.{name}{"_" * (name == "import")}'
+def _row(name: str) -> Command:
+    """Return what the table of its package says of a command."""
+    row: Command = import_module(COMMANDS[name]).ROWS[name]
+    return row
 
 
-def _module(name: str) -> ModuleType:
-    return import_module(_path(name))
+def _run(name: str, job: str, args: argparse.Namespace) -> int:
+    """Run a command, or one of its jobs."""
+    from .given import Given
 
-
-def _jobs(module: ModuleType | None) -> dict[str, Any]:
-    """Return the jobs of a command by name; none of a command that has one job."""
-    return getattr(module, 'JOBS', {})
+    module = import_module(f'{COMMANDS[name]}.{name}{"_" * (name == "import")}')
+    return int(getattr(module, job)(Given(**vars(args))))
 
 
 def _installed(package: str) -> bool:

@@ -26,8 +26,8 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 Options = str | Callable[[argparse.ArgumentParser], None]
 """A table of options, or a function that adds some by itself."""
@@ -40,6 +40,17 @@ _NUMBERS = (
     *('S', 'HZ', 'MIN', 'M', 'MM', 'M/S', 'GB', 'DEG', 'DEGC'),
     *('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
 )
+
+
+class Command(NamedTuple):
+    """A command, or a job of one, as a row of a table."""
+
+    text: str
+    """Its help; the first line is what the list of commands says of it."""
+    example: str = ''  # a whole command line
+    options: tuple[Options, ...] = ()
+    jobs: Mapping[str, Command] = {}  # by name; none of a command that does one thing
+    usual: str = ''  # the job that is meant where none is named
 
 
 class Rare(str):
@@ -80,6 +91,21 @@ READ: dict[str, Callable[[str], Any]] = {
     'R': robot_file,
 }
 """How a value is read, by what the help calls it; all others are texts."""
+
+
+def names_of(*tables: str) -> list[str]:
+    """Return the attributes that the options of tables are read into."""
+    typed = [typed.split()[0] for table in tables for typed, text in _rows(table) if text]
+    return [name.strip('-').replace('-', '_') for name in typed if name.startswith('-')]
+
+
+def add_command(places: Any, name: str, command: Command) -> Parser:
+    """Add a command to what ``add_subparsers`` returned."""
+    text = command.text.strip()
+    parser: Parser = places.add_parser(name, help=short_help(text), description=text)
+    parser.example = command.example
+    add_options(parser, *command.options)
+    return parser
 
 
 def add_options(parser: argparse.ArgumentParser, *parts: Options) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 
-from weld_twin_nodes.cli.options import folder_output, output
+from weld_twin_nodes.cli.options import folder_output
 from weld_twin_nodes.offline.environment import THREADS
 
 from ...study import Study, options, study
@@ -27,5 +27,5 @@ def run(study: Study) -> None:
     from ...benchmark import all_races
 
     sizes = all_races.QUICK if study.args.quick else all_races.FULL
-    with output(study.args, 'benchmark.json') as folder:
+    with study.args.output('benchmark.json') as folder:
         all_races.benchmark(folder, sizes, lambda line: print(line, flush=True))

@@ -12,12 +12,12 @@ import argparse
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.cli.options import add_command
+from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.cli.parsing import Command, add_command
 
 from ...study import (
     DONE,
     Study,
-    job,
     kept_of_engine,
     listed,
     options,
@@ -49,10 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the jobs, each with its options."""
     places = parser.add_subparsers(required=True, metavar='JOB', dest='job')
     for name, (add, command) in JOBS.items():
-        add_command(places, name, job(command.__doc__, add))
+        add_command(places, name, Command(str(command.__doc__), options=add))
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Given) -> int:
     """Run the job."""
     return JOBS[args.job][1](args)
 

@@ -12,8 +12,7 @@ import time
 from importlib import import_module
 from typing import Any
 
-from weld_twin_nodes.cli.options import add_command
-from weld_twin_nodes.cli.parsing import add_options
+from weld_twin_nodes.cli.parsing import Command, add_command
 
 OUT = '--out FILE, required  JSON file to write, or to replace if it is of the same campaign'
 FAILED = 1
@@ -27,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(required=True, metavar='CAMPAIGN', dest='campaign')
     for name in campaigns.names():
         module = import_module(f'{campaigns.__name__}.{name}')
-        add_options(add_command(jobs, name, module), OUT)
+        add_command(jobs, name, Command(str(module.__doc__), options=(*module.OPTIONS, OUT)))
 
 
 def run(args: argparse.Namespace) -> int:

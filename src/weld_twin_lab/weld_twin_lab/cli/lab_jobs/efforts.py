@@ -33,7 +33,6 @@ def run(study: Study) -> None:
     from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
     from weld_twin_msgs_py.tables import read_table
-    from weld_twin_nodes.cli.options import given_urdf, output, robot_of
     from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
     from ...real_arms.by_effort import folds, table
@@ -42,11 +41,11 @@ def run(study: Study) -> None:
     args = study.args
     if args.folds < 2:
         raise ModelError(f'--folds {args.folds}: give two stretches or more')
-    robot = robot_of(args)
+    robot = args.load_robot()
     recording = read_table(args.table, robot).recording
-    with output(args, RESULT) as place:
+    with args.output(RESULT) as place:
         page = table(recording.name, folds(recording, robot, args.folds, study.tell))
         write_text(place / PAGE, page)
         whole = diagnose(recording, robot, align=ALIGN)
-        write_results(place, whole, [hashed('recording', args.table)], given_urdf(args))
+        write_results(place, whole, [hashed('recording', args.table)], args.find_urdf())
     print(page, end='')

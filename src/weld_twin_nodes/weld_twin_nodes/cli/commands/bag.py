@@ -1,62 +1,33 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Look into a bag, make a damaged one whole, play it.
-
-'weld-twin bag BAG' alone tells what is in it.
-"""
+"""Look into a bag, make a damaged one whole, play it."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from rich.console import Console
+from rich.table import Table
+
 from weld_twin_core.errors import DataError
 
-from ..options import TOPICS, topics_of
-from . import job, jobs
+from ..given import Given
 
 if TYPE_CHECKING:
     from weld_twin_msgs_py.bags import BagInfo
 
-USUAL = 'info'
-"""The job that is meant where none is named."""
-EXAMPLE = 'weld-twin bag bags/elbow_play'
-INFO = """
-[BAG]                    rosbag2 directory, .mcap or .db3
---robots                 list the bundled robots and your own instead
-"""
-PLAY = """
-BAG                      rosbag2 directory, .mcap or .db3
---rate X                 2 plays twice as fast as recorded [default: 1]
---clock [HZ=100]         publish the time of the recording on /clock, HZ times a second (100 if left
-                         out)
---topics TOPIC ...       play only these
---loop [N=0]             play N times; without N, until stopped
-rare:
---subscribers N          start when every topic has so many subscribers [default: 1]
---wait S                 start after S seconds in any case [default: 5]
-"""
-RECOVER = """
-BAG                      bag, its .unfinished directory, or a file
---out BAG2               bag to write (default: the name the recording should have, or BAG_recovered)
-"""
 
-
-@job('weld-twin bag info bags/elbow_play', INFO, TOPICS)
-def info(args: argparse.Namespace) -> int:
-    """What is in a bag, what of it is usable, its rates and gaps."""
-    if args.robots:
+def info(given: Given) -> int:
+    """Print what is in a bag, or which robots there are."""
+    if given.robots:
         return _print_robots()
-    if not args.bag:
+    if not given.bag:
         raise DataError('give a BAG, or --robots')
-    from rich.console import Console
-    from rich.table import Table
-
     from weld_twin_msgs_py.bags import bag_info
 
-    result = bag_info(args.bag, topics_of(args))
+    result = bag_info(given.bag, given.read_topics())
     table = Table(box=None, pad_edge=False)
     for title in ('topic', 'type', 'used as'):
         table.add_column(title, no_wrap=True)
@@ -127,16 +98,11 @@ def _print_robots() -> int:
     return 0
 
 
-@job('weld-twin bag recover my_recording', RECOVER)
-def recover(args: argparse.Namespace) -> int:
-    """Make a bag of what is whole of a damaged one.
-
-    BAG is what the recorder was told to write. The original stays as it is; delete it when you have
-    looked at the new one.
-    """
+def recover(given: Given) -> int:
+    """Make a bag of what is whole of a damaged one, and say what was damaged."""
     from weld_twin_msgs_py.bags import recover
 
-    done = recover(args.bag, args.out or None)
+    done = recover(given.bag, given.out or None)
     for sentence in done.damage:
         print(f'note: {sentence}')
     for topic, count in sorted(done.messages.items()):
@@ -145,20 +111,13 @@ def recover(args: argparse.Namespace) -> int:
     return 0
 
 
-@job('weld-twin bag play bags/elbow_play --clock', PLAY)
-def play(args: argparse.Namespace) -> int:
-    """Play a bag into running nodes, without `ros2 bag play`.
-
-    Messages go out as they were recorded, header stamps included. Nodes that take the time from the
-    recording are started with use_sim_time and need --clock.
-    """
+def play(given: Given) -> int:
+    """Play a bag into running nodes."""
     from ...live.bag_player import Playing, play
 
-    times = 1 if args.loop is None else args.loop
-    how = Playing(args.rate, args.clock or 0.0, args.topics, times, args.subscribers, args.wait)
-    count = play(args.bag, how, lambda line: print(line, file=sys.stderr, flush=True))
+    times = 1 if given.loop is None else given.loop
+    start = given.subscribers, given.wait
+    how = Playing(given.rate, given.clock or 0.0, given.topics, times, *start)
+    count = play(given.bag, how, lambda line: print(line, file=sys.stderr, flush=True))
     print(f'{count} messages played')
     return 0
-
-
-JOBS = jobs(info, recover, play)

@@ -1,24 +1,14 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The whole job on an example: live nodes, a bag, a page."""
+"""The whole job on an example."""
 
 from __future__ import annotations
 
-import argparse
-
 from weld_twin_core.errors import TwinError
-from weld_twin_nodes.cli.options import folder_output
-
-EXAMPLE = 'weld-twin demo --out out'
+from weld_twin_nodes.cli.given import Given
 
 
-OPTIONS = (
-    folder_output('directory for the results', default='out'),
-    '--closed-loop  weld the seam again through the compensator, and show both beside each other',
-)
-
-
-def run(args: argparse.Namespace) -> int:
+def run(given: Given) -> int:
     """Run the demo."""
     try:
         import rclpy  # noqa: F401
@@ -28,5 +18,5 @@ def run(args: argparse.Namespace) -> int:
         ) from None
     from ...demo import run_demo
 
-    run_demo(args.out, closed_loop=args.closed_loop, force=args.force)
+    run_demo(given.out, closed_loop=given.closed_loop, force=given.force)
     return 0

@@ -1,88 +1,53 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pose and path accuracy and repeatability by ISO 9283.
-
-Finds the poses that the arm stopped at twice or more, and the path that it went twice or more.
-Writes iso9283.json and a page to read (report.html) to the directory.
-"""
+"""Pose and path accuracy and repeatability by ISO 9283."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from weld_twin_nodes.cli.options import (
-    ALIGN,
-    ROBOT,
-    TOPICS,
-    folder_output,
-    inputs_of,
-    output,
-    robot_of,
-    topics_of,
-)
+from rich.console import Console
+from rich.table import Table
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.algebra.problem import frames_named
+from weld_twin_core.metrics.performance import Performance, performance_of
+from weld_twin_nodes.cli.given import Given, inputs_of
+from weld_twin_nodes.offline.placed_robot import placed
 
-    from weld_twin_core.metrics.performance import Performance
+from ...report import performance_page as words
 
-EXAMPLE = 'weld-twin iso9283 my_cycles --robot ur5 --out accuracy'
 SCHEMA = 'weld_twin/iso9283/1'
-RESULT, PAGE = 'iso9283.json', 'report.html'
+RESULT = 'iso9283.json'
 WIDTH = 100
 """Columns of the table, whatever the terminal has."""
 FAR = 0.1
 """Accuracy [m] from which two frames are mixed up rather than an arm inaccurate."""
 
 
-OPTIONS = (
-    'BAG                      recording of the cell',
-    ROBOT,
-    ALIGN,
-    folder_output('directory for the results'),
-    TOPICS,
-)
-
-
-def run(args: argparse.Namespace) -> int:
+def run(given: Given) -> int:
     """Find the cycles, evaluate them, write the results, print a table."""
-    from rich.console import Console
-
-    from weld_twin_core import __version__
-    from weld_twin_core.diagnosis.algebra.problem import frames_named
-    from weld_twin_core.metrics.performance import performance_of
-    from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_msgs_py.files.whole_files import write_json, write_text
-    from weld_twin_nodes.offline.placed_robot import placed
-
-    from ...report.performance_page import performance_page
-
-    nominal = robot_of(args)
-    align = frames_named(args.align, '--align')
-    recording = read_recording(args.bag, nominal, topics_of(args))
+    nominal = given.load_robot()
+    align = frames_named(given.align, '--align')
+    recording = given.read_bag(given.bag, nominal)
     robot, notes = placed(recording, nominal, align)
     result = performance_of(recording, robot)
     notes += _warnings(result, align)
-    with output(args, RESULT) as place:
-        inputs = inputs_of(recording=args.bag, robot=args.robot)
-        page = performance_page(result, recording, robot.name, notes, inputs)
-        write_text(place / PAGE, page)
-        content = {
-            'schema': SCHEMA,
-            'version': __version__,
-            'robot': robot.name,
-            'recording': recording.name,
-            'align': args.align,
-            **result.as_dict(),
-            'notes': [*notes, *recording.notes],
-            'inputs': [item.as_dict() for item in inputs],
-        }
-        write_json(place / RESULT, content)
+    inputs = inputs_of(recording=given.bag, robot=given.robot)
+    content = {
+        'schema': SCHEMA,
+        'version': __version__,
+        'robot': robot.name,
+        'recording': recording.name,
+        'align': given.align,
+        **result.as_dict(),
+        'notes': [*notes, *recording.notes],
+        'inputs': [item.as_dict() for item in inputs],
+    }
+    page = words.performance_page(result, recording, robot.name, notes, inputs)
+    given.write_results(RESULT, page, content)
     _print(result, notes, Console(width=WIDTH, highlight=False, markup=False))
-    print(f'report: {Path(args.out) / PAGE}')
+    given.say_page()
     return 0
 
 
@@ -99,13 +64,10 @@ def _warnings(result: Performance, align: frozenset[str]) -> list[str]:
 
 
 def _print(result: Performance, notes: Sequence[str], console: Console) -> None:
-    from rich.table import Table
-
-    from ...report.performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows, sentence
-
-    console.print(sentence(result))
-    paths = [] if result.path is None else [path_row(result.path)]
-    for heads, rows in ((POSE_HEADS, pose_rows(result)), (PATH_HEADS, paths)):
+    console.print(words.sentence(result))
+    paths = [] if result.path is None else [words.path_row(result.path)]
+    poses = words.pose_rows(result)
+    for heads, rows in ((words.POSE_HEADS, poses), (words.PATH_HEADS, paths)):
         if rows:
             table = Table(box=None, pad_edge=False)
             for head in heads:

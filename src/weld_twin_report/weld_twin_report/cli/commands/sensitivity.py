@@ -1,24 +1,19 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which tolerance to tighten, by how much it moves the tool.
-
-For a robot on a seam, or for the motion of a bag. Writes sensitivity.json, indices, figures with
-their data and a page to read (sensitivity.html) to the directory; run again, it continues where
-it was stopped. --figure draws one figure only; --claims measures the paper's claims on several
-robots and seams.
-"""
+"""Which tolerance to tighten, by how much it moves the tool."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+import json
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.cli.main import brought
-from weld_twin_nodes.cli.options import ANY_ROBOT, TOPICS, folder_output, robot_of, topics_of
+
+from .. import progress
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -27,82 +22,47 @@ if TYPE_CHECKING:
     from ...sensitivity_report import Setting
     from ...sensitivity_report.study_files import Claims
 
-EXAMPLE = 'weld-twin sensitivity --robot ur5 --path spline --out study'
 _WORK = 'weld_twin_report.sensitivity_report.work'
 """What the processes that work need: they import it while this one gets their tasks ready."""
 
 
-OPTIONS = (
-    '[BAG]                    study the motion recorded in a bag',
-    ANY_ROBOT,
-    folder_output('directory for the results'),
-    """
-what is studied:
---path P                 path file, or line, arc, circle, polyline, spline, weave [default: line]
---tolerances FILE        tolerance file (default: typical sizes of joint_offset, link_length,
-                         link_twist, backlash and base_pose)
---effects-known FILE     effects file or diagnosis.json; the twin has these effects from the start
---figure K               draw figure 6 to 14, posture or recorded, and nothing else; may be given again
---claims                 measure the claims of the paper
-of the seam, and of the claims:
-rare:
---claims-robots R ...    robots of the claims (default: seven builds)
---tool X Y Z RX RY RZ    tool frame in the flange [m, rotation vector rad], instead of the model's
---points N               path points [default: 200]
---across M               weld tolerance across the seam [default: 5e-4]
---stickout M             weld tolerance of the stick-out [default: 1e-3]
---normal X Y Z           direction out of the work, for a recorded motion (default: against the wire)
-how much is run, and where:
-rare:
---samples N              Sobol base samples, a power of two [default: 1024]
---runs N                 runs of the tolerance stack [default: 20000]
---trajectories N         trajectories of the Morris screening [default: 50]
---placements N           placements tried for the advice [default: 32]
---seed N                 seed of all draws [default: 0]
---workers N              processes (default: one a core)
---scheduler ADDRESS      Dask scheduler to run on instead
-""",
-    TOPICS,
-)
-
-
-def run(args: argparse.Namespace) -> int:
+def run(given: Given) -> int:
     """Run the study and say where the page is."""
     from weld_twin_nodes.offline.task_pool import pool_of
 
-    setting = _setting(args)
-    if args.figure:
+    setting = _setting(given)
+    if given.figure:
         from ...sensitivity_report import make_figures
         from ...sensitivity_report.study_files import FIGURES, study_directory, study_files
 
         assert setting is not None
-        place = study_directory(args.out)
-        with study_files(place, args.force) as made:
-            drawings = make_figures(made / FIGURES, setting, args.figure)
+        place = study_directory(given.out)
+        with study_files(place, given.force) as made:
+            drawings = make_figures(made / FIGURES, setting, given.figure)
         for drawing in drawings:
             print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
-    claims = _claims(args)
+    claims = _claims(given)
     with (
-        closing(pool_of(args.scheduler, args.workers or 0, ahead=_WORK)) as pool,
-        _progress() as tell,
+        closing(pool_of(given.scheduler, given.workers or 0, ahead=_WORK)) as pool,
+        progress('starting') as (_, tell),
     ):
         from ...sensitivity_report import make_study
 
         page = make_study(
-            args.out,
+            given.out,
             pool,
             setting,
             claims=claims,
             tell=tell,
-            force=args.force,
+            force=given.force,
         )
-    _print_summary(Path(args.out))
+    _print_summary(Path(given.out))
     print(f'page: {page}')
     return 0
 
 
-def _setting(args: argparse.Namespace) -> Setting | None:
+def _setting(given: Given) -> Setting | None:
     from weld_twin_core.motion.paths import KINDS, default_seam
     from weld_twin_core.sensitivity import WeldTolerance
     from weld_twin_msgs_py.files.path_file import read_path
@@ -110,79 +70,77 @@ def _setting(args: argparse.Namespace) -> Setting | None:
 
     from ...sensitivity_report import Effort, Setting
 
-    if not args.robot and not args.bag:
-        if args.claims and not args.figure:
+    if not given.robot and not given.bag:
+        if given.claims and not given.figure:
             return None
         raise DataError('give --robot R or a BAG to study, or --claims')
-    twin = build_twin(_robot(args), args.effects_known)
+    twin = build_twin(_robot(given), given.effects_known)
     common = {
         'robot': twin.robot,
-        'tolerances': _tolerances(args, twin.robot),
+        'tolerances': _tolerances(given, twin.robot),
         'known': twin.effects,
-        'points': args.points,
-        'weld': WeldTolerance(args.across, args.stickout),
-        'effort': Effort(args.samples, args.runs, args.trajectories, args.placements, args.seed),
+        'points': given.points,
+        'weld': WeldTolerance(given.across, given.stickout),
+        'effort': Effort(
+            given.samples, given.runs, given.trajectories, given.placements, given.seed
+        ),
     }
-    if args.bag:
-        from weld_twin_msgs_py.bags import read_recording
-
+    if given.bag:
         return Setting(
-            seam=Path(args.bag).name,
-            recording=read_recording(args.bag, twin.robot, topics_of(args)),
-            normal=args.normal,
+            seam=Path(given.bag).name,
+            recording=given.read_bag(given.bag, twin.robot),
+            normal=given.normal,
             **common,
         )
-    if args.path in KINDS:
-        return Setting(seam=args.path, path=default_seam(twin.robot, args.path), **common)
-    path, torch = read_path(args.path)
-    return Setting(seam=Path(args.path).stem, path=path, torch=torch, **common)
+    if given.path in KINDS:
+        return Setting(seam=given.path, path=default_seam(twin.robot, given.path), **common)
+    path, torch = read_path(given.path)
+    return Setting(seam=Path(given.path).stem, path=path, torch=torch, **common)
 
 
-def _robot(args: argparse.Namespace) -> Robot:
+def _robot(given: Given) -> Robot:
     import numpy as np
 
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arm.rotation import rotation_matrix, transform
 
-    if args.robot:
-        robot = robot_of(args)
+    if given.robot:
+        robot = given.load_robot()
     else:
         from weld_twin_msgs_py.bags import provenance  # the readers of bags take their time
 
-        model = provenance(args.bag).get('robot')
+        model = provenance(given.bag).get('robot')
         if not isinstance(model, dict):
-            raise DataError(f"bag '{args.bag}' holds no robot model; give --robot R")
+            raise DataError(f"bag '{given.bag}' holds no robot model; give --robot R")
         robot = Robot.from_mapping(model)
-    if args.tool is None:
+    if given.tool is None:
         return robot
-    tool = transform(rotation_matrix(args.tool[3:]), np.array(args.tool[:3]))
+    tool = transform(rotation_matrix(given.tool[3:]), np.array(given.tool[:3]))
     return robot.with_frames(tool=tool)
 
 
-def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]:
+def _tolerances(given: Given, robot: Robot) -> tuple[Tolerance, ...]:
     from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
     from weld_twin_msgs_py.files.yaml_file import read_yaml
 
-    if not args.tolerances:
+    if not given.tolerances:
         return default_tolerances(robot)
     try:
-        return tolerances_from_list(read_yaml(args.tolerances, 'tolerance file'), robot)
+        return tolerances_from_list(read_yaml(given.tolerances, 'tolerance file'), robot)
     except ModelError as error:
-        raise ModelError(f"tolerance file '{args.tolerances}': {error}") from None
+        raise ModelError(f"tolerance file '{given.tolerances}': {error}") from None
 
 
-def _claims(args: argparse.Namespace) -> Claims | None:
+def _claims(given: Given) -> Claims | None:
     """Return what measures the claims of the paper; they are a proof, which another package brings."""
-    if not args.claims:
+    if not given.claims:
         return None
     study = brought('weld_twin_lab.claims.study', '--claims')
-    claims: Claims = study.claims_on(args.claims_robots, args.seed)
+    claims: Claims = study.claims_on(given.claims_robots, given.seed)
     return claims
 
 
 def _print_summary(place: Path) -> None:
-    import json
-
     from ...sensitivity_report.fitter_words import advised, parameter_words
     from ...sensitivity_report.study_files import CLAIMS, RESULT
 
@@ -207,18 +165,3 @@ def _print_summary(place: Path) -> None:
     if (place / CLAIMS).is_file():
         for claim in json.loads((place / CLAIMS).read_text())['claims']:
             print(f'{claim["statement"]}: {claim["verdict"]}')
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int, str], None]]:
-    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task('starting', total=None)
-        yield lambda done, total, label: bar.update(
-            task, completed=done, total=total, description=label
-        )

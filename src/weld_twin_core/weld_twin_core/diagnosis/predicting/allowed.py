@@ -237,14 +237,15 @@ def _prior(what: Directions, model: Model) -> Prior:
     frames, effects = what.frame_count, what.effects
     group, gears = plausible_arm.groups(effects)
     sizes = [k.size for k in what.knots]
+    springs = int(what.gives > 0)
     gives = np.full(what.gives, gears.size)
-    curves = gears.size + 1 + np.repeat(np.arange(len(sizes)), sizes)
+    curves = gears.size + springs + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
     return Prior(
         np.concatenate([np.zeros(frames), tied, np.zeros(what.shapes)]),
         plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
-        np.concatenate([gears, np.ones(1 + len(sizes), bool)]),
+        np.concatenate([gears, np.ones(springs + len(sizes), bool)]),
     )
 
 

@@ -17,8 +17,6 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..blind.cause_sizes import Cause
 from ..blind.recorded_motion import RATE
-from ..contacts.sealed import SOCKETS, made
-from ..contacts.touching import postures_at
 from ..fleet.cheap_years import cheap_year
 from ..fleet.full_years import CHECKS, base
 from ..plant.plant import run
@@ -30,6 +28,7 @@ from ..programs.plain_controller import evenly
 from ..programs.sealed_seams import BARE, sealed_seam
 from .held import twin_for
 from .sealed import of_drawn, of_motion, on_an_arm
+from .touched import SOCKETS, made, postures_at
 
 YEARS = 10
 """Drawn years of a cell whose checks were diagnosed."""

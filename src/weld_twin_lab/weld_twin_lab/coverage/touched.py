@@ -1,23 +1,30 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sealed contacts: the plant touches sockets with one flaw and some slack; is the flaw named?"""
+"""Sealed contacts: the plant touches sockets with one flaw and some slack."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.contacts import Tie, spreads
-from weld_twin_core.recording import Recording
+from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
+from weld_twin_core.motion.inverse.newton import STRETCHED, least_step, reaching
+from weld_twin_core.recording import JointMotion, Recording
 
 from ..blind.cause_sizes import Cause, draw, scaled
-from .touching import postures_at, touching
 
+ROUNDS = 4
+"""Newton steps in which the plant is made to touch: each leaves a hundredth of what was off."""
+TRIES = 60
+"""Postures that are started from for each one wanted; some leave the limits."""
+TURN = 2.5
+"""Largest angle of a joint [rad] that is started from: further ones wind up cables."""
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
 """Arms of which link masses are known, so that every cause can act."""
 FAMILIES = (
@@ -50,12 +57,11 @@ TIES = tuple(Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS)))
 
 
 class Sealed(NamedTuple):
-    """An arm with one flaw, its touches, and how far the flaw moves in slacks."""
+    """An arm with one flaw, and its touches."""
 
     robot: Robot
     cause: Cause
     recording: Recording
-    slacks: float
 
 
 def made(seed: int) -> Sealed:
@@ -71,13 +77,12 @@ def made(seed: int) -> Sealed:
     cause = draw(str(rng.choice(FAMILIES)), robot, 1.0, rng)
     slack, size = float(rng.uniform(*SLACK)), float(rng.uniform(*SIZE))
     start, labels, places = _starts(robot, rng)
-    recording = touching(robot, [cause], start, labels, places, TIES, rng)
+    recording = _touching(robot, [cause], start, labels, places, rng)
     shown = _shown(robot, recording)
-    factor = min(size * slack / max(shown, 1e-12), LARGEST)
-    cause = scaled(cause, factor)
+    cause = scaled(cause, min(size * slack / max(shown, 1e-12), LARGEST))
     loose = places + rng.normal(0.0, slack, places.shape)
-    recording = touching(robot, [cause], start, labels, loose, TIES, rng)
-    return Sealed(robot, cause, recording, shown * factor / slack)
+    recording = _touching(robot, [cause], start, labels, loose, rng)
+    return Sealed(robot, cause, recording)
 
 
 def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], Array]:
@@ -99,3 +104,46 @@ def _shown(robot: Robot, recording: Recording) -> float:
     points = forward(robot, recording.joints.q)[:, :3, 3]
     away = np.concatenate(list(spreads(recording.contacts, points).values()))
     return float(np.sqrt((away**2).mean() / 3.0))
+
+
+def postures_at(robot: Robot, place: Array, count: int, rng: np.random.Generator) -> Array:
+    """
+    Return nominal postures in which the tool point is at a place, within the limits.
+
+    place: shape (3,) [m].
+    count: how many at the most.
+    """
+    low, high = np.maximum(robot.lower, -TURN), np.minimum(robot.upper, TURN)
+    start = rng.uniform(low, high, (TRIES * count, robot.n))
+    q, near = reaching(robot, np.tile(place, (len(start), 1)), start)
+    within = (q > low).all(axis=1) & (q < high).all(axis=1)
+    return np.asarray(q[near & within][:count])
+
+
+def _touching(
+    robot: Robot,
+    causes: Sequence[Cause],
+    q: Array,
+    labels: Sequence[str],
+    places: Array,
+    rng: np.random.Generator,
+) -> Recording:
+    """
+    Return the joint readings at which the plant's own tool point touches.
+
+    q: postures to start from, shape (M, n) [rad or m].
+    places: where each touch takes place, shape (M, 3) [m].
+    """
+    from ..plant.plant import run
+    from ..plant.plant_recording import Command
+    from ..plant.tracker import Tracker
+
+    t = 1.0 + np.arange(float(len(q)))
+    for _ in range(ROUNDS):
+        command = Command(t, q, static=True)
+        real = run(robot.to_mapping(), list(causes), command, Tracker(), rng)
+        q = q + least_step(jacobian(robot, q)[:, :3], places - real.position, STRETCHED)
+    names = tuple(Contact(name) for name in dict.fromkeys(labels))
+    motion = JointMotion(t, q, static=True)
+    touched = Contacts(Artefact(names, TIES), tuple(labels))
+    return Recording('plant', motion, contacts=touched)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_lab.contacts.touching import postures_at
+from weld_twin_lab.coverage.touched import postures_at
 from weld_twin_lab.real_arms.sources import places_of, socket_robot, touches
 
 PLACES = {'front': [0.5, 0.0, 0.2], 'left': [0.0, 0.5, 0.4]}

@@ -13,7 +13,13 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.algebra.columns import Columns
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.search import search
+from weld_twin_core.diagnosis.levels.curved import carried
+from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.diagnosis.verdict.decision import Verdict
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -70,16 +76,6 @@ def test_predictions_are_those_of_least_squares_on_the_other_stretches(columns, 
     # with 230 columns one inverse per stretch serves every choice of effects
     unseen = made_up(columns, 5, prior=30.0)
     np.testing.assert_allclose(unseen.predict(kept), refitted(unseen, kept), atol=1e-7)
-
-
-@pytest.mark.parametrize('prior', [1e-3, 30.0, 1e5])
-def test_what_the_data_determine_is_what_the_fit_follows(prior):
-    """As many coordinates as the trace of the matrix that leads from targets to their fit."""
-    unseen = made_up(20, 5, prior=prior)
-    columns = unseen.columns.written_out()
-    system = columns @ columns.T + np.diag(unseen.precision)
-    follows = np.trace(np.linalg.solve(system, columns @ columns.T))
-    assert unseen.determined() == pytest.approx(follows, rel=1e-6)
 
 
 @pytest.mark.parametrize('kept', [[], [0, 2]])
@@ -209,3 +205,18 @@ def test_what_one_stretch_alone_shows_stays_put_elsewhere():
     unseen = Unseen(None, None, labels, Columns.of(columns), (), *told, none, none)
     left = unseen.base([]).residual
     np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)
+
+
+def test_a_gap_that_is_carried_without_a_model_keeps_its_size():
+    """The frames alone were fitted while the whole gap counted as noise; then noise is known."""
+    problem, model = tiny(TRUE, count=40, align=('base',), turned=False)
+    result = search(problem, model, tuple(REGISTRY), Beliefs(), lambda text: None)
+    result = replace(result, scale=known_scale(problem))
+    position = problem.residuals(result.baseline.model)[0][:3]
+    gap = np.sqrt((position**2).sum(axis=0).mean())
+    unseen = Unseen.of(problem, result.scale, result.final, result.precision)
+    worse = Shrink(gap, 2.0 * gap, 2.0, (1.0, 3.0), 'stretches')
+    case = result, unseen, worse, Verdict('unknown'), None, (), Beliefs()
+    _, unseen, shrink, _ = carried(*case)
+    assert unseen.rms(unseen.residual) == pytest.approx(gap)
+    assert shrink.rms_before_m == shrink.rms_after_m > gap

@@ -111,7 +111,10 @@ def carried(
     if shrink.rms_after_m <= shrink.rms_before_m:
         return result, unseen, shrink, verdict
     # Without a name there is no reason to carry what makes unseen data worse.
-    result = replace(result, final=result.baseline, precision=np.zeros(0), slots=(), dense=False)
+    # The frames alone were fitted when the noise was not known yet.
+    bare = result.problem.whitened(result.problem.residuals(result.baseline.model), result.scale)
+    final = replace(result.baseline, residual=bare)
+    result = replace(result, final=final, precision=np.zeros(0), slots=(), dense=False)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     return result, unseen, shrink, replace(verdict, sets=())

@@ -31,6 +31,7 @@ from weld_twin_nodes.offline.task_pool import (
 )
 from weld_twin_report.sensitivity_report import Effort, Setting
 from weld_twin_report.sensitivity_report.figures import draw, drawable
+from weld_twin_report.sensitivity_report.study_files import run_claims
 from weld_twin_report.sensitivity_report.study_page import study_page
 from weld_twin_report.sensitivity_report.work import run_study
 
@@ -141,6 +142,12 @@ def test_figures_are_as_they_were_kept(setting, kept):
     drawn = [replace(draw(setting, key), svg='') for key in drawable(setting)]
     tables = [{key: value.tolist() for key, value in each.table.items()} for each in drawn]
     kept('figures', both_forms(study_page(None, None, drawn), tables))
+
+
+def test_claims_are_as_they_were_kept(setting, kept):
+    with Runner(Here()) as runner:
+        claims = run_claims(runner, [setting.robot], ['line'])
+    kept('claims', both_forms(study_page(None, claims, ()), claims))
 
 
 def both_forms(page, numbers):

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from types import ModuleType
 
 from weld_twin_core import __version__
-from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.errors import TwinError
 
 from ..offline.environment import THREADS
 from .parsing import Command, Parser, add_command, short_help
@@ -139,7 +139,9 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
     chosen = OLD.get(typed, typed).partition(' ')[0]
     package = COMMANDS.get(chosen, '').partition('.')[0]
     if package and not _installed(package):
-        parser.error(_lacks(typed, package))
+        parser.error(
+            f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
+        )
     for name in [chosen] if package else [name for name in COMMANDS if name not in BEFORE]:
         if _installed(COMMANDS[name].partition('.')[0]):
             _add(subparsers, name, chosen)
@@ -176,22 +178,6 @@ def _run(name: str, job: str, args: argparse.Namespace) -> int:
 
 def _installed(package: str) -> bool:
     return find_spec(package) is not None
-
-
-def _lacks(typed: str, package: str) -> str:
-    return f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
-
-
-def brought(module: str, typed: str) -> ModuleType:
-    """
-    Return a module of a package that whoever asks does not know, for what was typed.
-
-    Raises DataError: the package is not installed.
-    """
-    package = module.partition('.')[0]
-    if not _installed(package):
-        raise DataError(_lacks(typed, package))
-    return import_module(module)
 
 
 def _one_line(error: Exception) -> str:

@@ -5,7 +5,6 @@
 import csv
 import json
 import re
-import sys
 from contextlib import redirect_stdout
 from io import StringIO
 
@@ -125,15 +124,3 @@ def test_a_directory_of_something_else_is_left_alone(tmp_path, capsys):
     assert main(['sensitivity', '--robot', 'ur5', '--out', str(tmp_path)]) == 2
     assert 'holds something else' in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']
-
-
-def test_claims_without_the_package_of_proofs_are_refused_with_its_name(
-    tmp_path, capsys, monkeypatch
-):
-    monkeypatch.setitem(sys.modules, 'weld_twin_lab', None)
-    assert main(['sensitivity', '--claims', '--out', str(tmp_path / 'study')]) == 2
-    said = capsys.readouterr().err
-    assert (
-        "'--claims' is a proof; it needs the package weld_twin_lab, which is not installed" in said
-    )
-    assert not (tmp_path / 'study').exists()

@@ -4,29 +4,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import Tolerance
+from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.whole_files import write_json, write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_nodes.offline.output_directory import new_directory
-from weld_twin_nodes.offline.task_pool import Pool, Runner, Tell
+from weld_twin_nodes.offline.task_pool import Pool, Runner, Task, Tell
 
 from .figures import Drawing, draw, drawable
 from .setting import Setting
 from .study_page import study_page
-from .work import run_study
+from .work import claim_case, run_study
 
+ROBOTS = (
+    'ur5',
+    'ur10',
+    'kuka_kr6_r900',
+    'abb_irb120',
+    'abb_irb1600',
+    'fanuc_m10ia',
+    'franka_panda',
+)
+"""One of each kind of build: the verdicts of `docs/claims.md` were measured on them."""
+SEAMS = ('line', 'arc', 'polyline')
 RESULT, CLAIMS, PAGE = 'sensitivity.json', 'claims.json', 'sensitivity.html'
 TASKS, FIGURES = 'tasks', 'figures'
-Claims = Callable[[Runner, Path], dict[str, Any]]
-"""Measures the claims of the paper, writes their files to a folder, and returns them."""
 
 
 def study_directory(path: Path | str) -> Path:
@@ -62,6 +73,14 @@ def write_study(place: Path, result: dict[str, Any], tolerances: Sequence[Tolera
     write_json(place / RESULT, {**result, 'version': __version__}, overwrite=True)
 
 
+def write_claims(place: Path, result: dict[str, Any]) -> None:
+    """Write the claims table in every form, and the measurements behind it."""
+    write_text(place / 'claims.csv', claims_csv(result), overwrite=True)
+    write_text(place / 'claims-cases.csv', cases_csv(result), overwrite=True)
+    write_text(place / 'claims.md', claims_markdown(result), overwrite=True)
+    write_json(place / CLAIMS, {**result, 'version': __version__}, overwrite=True)
+
+
 def indices_csv(result: dict[str, Any]) -> str:
     """Return every index of every motion, grouping and output, a row each."""
     header = ('motion', 'by', 'output', 'name', 'S1', 'S1_half', 'ST', 'ST_half')
@@ -82,8 +101,10 @@ def make_study(
     pool: Pool,  # where tasks run
     setting: Setting | None,  # left out, only the claims are studied
     *,
-    claims: Claims | None = None,
+    claims_on: Sequence[Robot] = (),  # robots the claims are measured on; none for no claims
+    seams: Sequence[str] = SEAMS,  # bundled seams the claims are measured on
     tell: Tell | None = None,  # told about progress
+    seed: int = 0,  # of the claims
     force: bool = False,  # as `new_directory` takes it
 ) -> Path:
     """Run a study, the claims, or both, write the results and return the page."""
@@ -97,10 +118,12 @@ def make_study(
 
         with Runner(pool, place / TASKS, tell) as runner:
             study = None if setting is None else run_study(setting, runner, draw_all)
-            measured = None if claims is None else claims(runner, made)
+            claims = run_claims(runner, claims_on, seams, seed) if claims_on else None
         if setting is not None and study is not None:
             write_study(made, study, setting.tolerances)
-        write_text(made / PAGE, study_page(study, measured, drawings))
+        if claims is not None:
+            write_claims(made, claims)
+        write_text(made / PAGE, study_page(study, claims, drawings))
     return place / PAGE
 
 
@@ -116,3 +139,52 @@ def make_figures(place: Path, setting: Setting, keys: Sequence[str]) -> list[Dra
     for drawing in drawings:
         write_drawing(place, drawing)
     return drawings
+
+
+def run_claims(
+    runner: Runner, robots: Sequence[Robot], seams: Sequence[str] = SEAMS, seed: int = 0
+) -> dict[str, Any]:
+    """Return the claims with their verdicts, and what was measured on every case."""
+    from weld_twin_core.sensitivity.claims import CaseName, judge
+
+    names = [CaseName(robot.name, seam) for robot in robots for seam in seams]
+    tasks = [
+        Task(claim_case, (robot, seam, seed), f'claims: {robot.name}, {seam}')
+        for robot in robots
+        for seam in seams
+    ]
+    result = dict(zip(names, runner.run(tasks), strict=True))
+    return {
+        'schema': 'weld_twin/claims/1',
+        'seed': seed,
+        'robots': [robot.name for robot in robots],
+        'seams': list(seams),
+        'claims': [claim.as_dict() for claim in judge(result)],
+        'cases': [{**name._asdict(), **measured} for name, measured in result.items()],
+    }
+
+
+def claims_csv(result: dict[str, Any]) -> str:
+    """Return the table with a row for every claim."""
+    keys = ('claim', 'statement', 'where', 'verdict', 'held', 'cases', 'reason')
+    return csv_text(keys, ([claim[key] for key in keys] for claim in result['claims']))
+
+
+def cases_csv(result: dict[str, Any]) -> str:
+    """Return every measurement of every case."""
+    keys = list(result['cases'][0])
+    return csv_text(keys, ([case.get(key, '') for key in keys] for case in result['cases']))
+
+
+def claims_markdown(result: dict[str, Any]) -> str:
+    """Return the table for reading."""
+    rows = [('Claim', 'In the paper', 'Holds as written', 'Verdict', 'Why, as measured')]
+    for c in result['claims']:
+        share = f'{c["held"]} of {c["cases"]}'
+        rows.append((c['statement'], c['where'], share, f'**{c["verdict"]}**', c['reason']))
+    return (
+        f'Measured on {len(result["robots"])} robots ({", ".join(result["robots"])}) and '
+        f'{len(result["seams"])} seams ({", ".join(result["seams"])}) each.\n\n'
+        # The bars of a norm would end a cell.
+        + markdown.table(*([cell.replace('|', '‖') for cell in row] for row in rows))
+    )

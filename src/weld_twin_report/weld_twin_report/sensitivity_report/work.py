@@ -16,7 +16,7 @@ from weld_twin_core import sensitivity
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.metrics.deviation import root_mean_square
-from weld_twin_core.motion.paths import Path, Torch
+from weld_twin_core.motion.paths import Path, Torch, default_seam
 from weld_twin_core.sensitivity import (
     Model,
     MorrisDesign,
@@ -156,6 +156,14 @@ def placement(
     """Return the best torch rotation and base placement."""
     outcome = sensitivity.advise(robot, path, tolerances, torch=torch, tries=tries, seed=seed)
     return [result.as_dict() for result in outcome]
+
+
+def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
+    """Return the measurements of a robot on a bundled seam that decide the claims."""
+    # A study without claims does without what they bring along.
+    from weld_twin_core.sensitivity.claims import measure_case
+
+    return measure_case(robot, default_seam(robot, seam), seed)
 
 
 Job = tuple[Study, tuple[Tolerance, ...], Design, tuple[Tolerance, ...] | None]

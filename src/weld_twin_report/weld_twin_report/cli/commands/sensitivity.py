@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_nodes.cli.given import Given
-from weld_twin_nodes.cli.main import brought
 
 from .. import progress
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from weld_twin_core.sensitivity.tolerance import Tolerance
 
     from ...sensitivity_report import Setting
-    from ...sensitivity_report.study_files import Claims
 
 _WORK = 'weld_twin_report.sensitivity_report.work'
 """What the processes that work need: they import it while this one gets their tasks ready."""
@@ -42,7 +40,7 @@ def run(given: Given) -> int:
         for drawing in drawings:
             print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
-    claims = _claims(given)
+    robots = _claims_robots(given)
     with (
         closing(pool_of(given.scheduler, given.workers or 0, ahead=_WORK)) as pool,
         progress('starting') as (_, tell),
@@ -53,8 +51,9 @@ def run(given: Given) -> int:
             given.out,
             pool,
             setting,
-            claims=claims,
+            claims_on=robots,
             tell=tell,
+            seed=given.seed,
             force=given.force,
         )
     _print_summary(Path(given.out))
@@ -131,13 +130,12 @@ def _tolerances(given: Given, robot: Robot) -> tuple[Tolerance, ...]:
         raise ModelError(f"tolerance file '{given.tolerances}': {error}") from None
 
 
-def _claims(given: Given) -> Claims | None:
-    """Return what measures the claims of the paper; they are a proof, which another package brings."""
-    if not given.claims:
-        return None
-    study = brought('weld_twin_lab.claims.study', '--claims')
-    claims: Claims = study.claims_on(given.claims_robots, given.seed)
-    return claims
+def _claims_robots(given: Given) -> list[Robot]:
+    from weld_twin_msgs_py.robots import load_robot
+
+    from ...sensitivity_report.study_files import ROBOTS
+
+    return [load_robot(name) for name in given.claims_robots or ROBOTS] if given.claims else []
 
 
 def _print_summary(place: Path) -> None:

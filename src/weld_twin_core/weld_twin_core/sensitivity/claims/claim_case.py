@@ -10,14 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.arm.rotation import rotation_matrix, transform
-from weld_twin_core.arrays import Array
-from weld_twin_core.motion.paths import Path
-from weld_twin_core.motion.profiles import Aggressive
-from weld_twin_core.sensitivity.local import LocalSensitivity, local_sensitivity
-from weld_twin_core.sensitivity.seam_study import Study, planned_study
-from weld_twin_core.sensitivity.tolerance import Tolerance, default_tolerances
+from ...arm.robot import Robot
+from ...arm.rotation import rotation_matrix, transform
+from ...arrays import Array
+from ...motion.paths import Path
+from ...motion.profiles import Aggressive
+from ..local import LocalSensitivity, local_sensitivity
+from ..seam_study import Study, planned_study
+from ..tolerance import Tolerance, default_tolerances
 
 POINTS = 400
 """Path points; the aggressive motion passes each part of the seam many times."""

@@ -9,25 +9,18 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import spearmanr
 
-from weld_twin_core.arm.chain import jacobian
-from weld_twin_core.arrays import Array
-from weld_twin_core.effects import Effect
-from weld_twin_core.effects.frame_errors import BasePose
-from weld_twin_core.effects.geometry import JointOffset
-from weld_twin_core.motion.planned_motion import plan
-from weld_twin_core.motion.profiles import Constant
-from weld_twin_core.sensitivity.local import local_sensitivity, posture
-from weld_twin_core.sensitivity.seam_study import study_of_plan
-from weld_twin_core.sensitivity.sweep import (
-    DEGREE,
-    default_values,
-    end_of_linearity,
-    sweep,
-    together,
-)
-from weld_twin_core.sensitivity.tolerance import default_tolerances
-from weld_twin_core.twin.twin import Twin
-
+from ...arm.chain import jacobian
+from ...arrays import Array
+from ...effects import Effect
+from ...effects.frame_errors import BasePose
+from ...effects.geometry import JointOffset
+from ...motion.planned_motion import plan
+from ...motion.profiles import Constant
+from ...twin.twin import Twin
+from ..local import local_sensitivity, posture
+from ..seam_study import study_of_plan
+from ..sweep import DEGREE, default_values, end_of_linearity, sweep, together
+from ..tolerance import default_tolerances
 from .claim_case import BENT_TORCH, POINTS, Case, Measure
 
 _POSTURES = 2000

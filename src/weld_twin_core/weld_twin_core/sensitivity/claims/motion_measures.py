@@ -8,16 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
-from weld_twin_core.effects import Effect
-from weld_twin_core.effects.backlash import Backlash
-from weld_twin_core.effects.geometry import JointOffset
-from weld_twin_core.effects.servo_lag import ServoLag
-from weld_twin_core.sensitivity.seam_study import Study
-from weld_twin_core.sensitivity.sweep import DEGREE, spread_of_passes
-from weld_twin_core.sensitivity.tolerance import default_tolerances
-from weld_twin_core.sensitivity.trajectory_advice import compare_profiles, rms_over_arc
-
+from ...arrays import Array
+from ...effects import Effect
+from ...effects.backlash import Backlash
+from ...effects.geometry import JointOffset
+from ...effects.servo_lag import ServoLag
+from ..seam_study import Study
+from ..sweep import DEGREE, spread_of_passes
+from ..tolerance import default_tolerances
+from ..trajectory_advice import compare_profiles, rms_over_arc
 from .claim_case import POINTS, Case, Measure
 
 _WIDTH = 0.03 * DEGREE

@@ -8,12 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
-from weld_twin_core.sensitivity.evaluate import draws_at, exact_deviations, model
-from weld_twin_core.sensitivity.sobol import SobolDesign
-from weld_twin_core.sensitivity.sweep import DEGREE, cumulative, scenario_deviations
-from weld_twin_core.sensitivity.tolerance import with_draws
-
+from ...arrays import Array
+from ..evaluate import draws_at, exact_deviations, model
+from ..sobol import SobolDesign
+from ..sweep import DEGREE, cumulative, scenario_deviations
+from ..tolerance import with_draws
 from .claim_case import Case, Measure
 
 _GROUPS = {

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from weld_twin_core.errors import DataError
-
+from ...errors import DataError
 from .rules import RULES, Measured, Range, Rule
 
 HOLDS, HOLDS_WHEN, DOES_NOT = 'holds', 'holds when', 'does not hold'

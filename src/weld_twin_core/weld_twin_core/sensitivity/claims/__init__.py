@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's claims: what is measured on each robot and seam, and what that says of each."""
 
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.motion.paths import Path
-
+from ...arm.robot import Robot
+from ...motion.paths import Path
 from .claim_case import Case
 from .combined_measures import MEASURES as COMBINED
 from .geometric_measures import MEASURES as GEOMETRIC

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios, sweeps and advice against hand values."""
+"""Verdicts follow the measurements; scenarios, sweeps and advice against hand values."""
 
 import numpy as np
 import pytest
@@ -20,6 +20,8 @@ from weld_twin_core.sensitivity import (
     scenario_deviations,
     sweep,
 )
+from weld_twin_core.sensitivity.claims import CaseName, judge, measure_case
+from weld_twin_core.sensitivity.claims.combined_measures import growth_exponent
 
 
 @pytest.fixture(scope='module')
@@ -30,6 +32,11 @@ def ur5():
 @pytest.fixture(scope='module')
 def study(ur5):
     return planned_study(ur5, default_seam(ur5), points=60)
+
+
+@pytest.fixture(scope='module')
+def case(ur5):
+    return measure_case(ur5, default_seam(ur5))
 
 
 def test_a_joint_offset_deviates_by_the_chord_of_its_arc(study):
@@ -52,6 +59,12 @@ def test_combined_scenario_is_below_the_sum_of_its_parts(study):
     found = {k: np.linalg.norm(v, axis=1) for k, v in scenario_deviations(study).items()}
     together = found.pop('combined')
     assert (together < sum(found.values())).all()
+
+
+def test_the_power_of_a_sum_of_constants_is_one():
+    grid = np.linspace(0.0, 1.0, 1000)
+    assert growth_exponent(grid, np.arange(1.0, 1001.0)) == pytest.approx(1.0, abs=0.01)
+    assert growth_exponent(grid, np.cumsum(grid)) == pytest.approx(2.0, abs=0.01)
 
 
 def test_time_laws_do_not_matter_to_pure_geometry(ur5):
@@ -93,3 +106,26 @@ def test_moving_the_base_keeps_the_seam_where_it_is(ur5):
     path = Line([0.5, -0.1, 0.2], [0.5, 0.1, 0.2])
     here, there = (planned_study(robot, path, points=10) for robot in (ur5, moved))
     np.testing.assert_allclose(there.nominal.position, here.nominal.position, atol=1e-9)
+
+
+def test_claims_of_identities_are_measured_as_such(case):
+    assert case['baseline_d_norm'] < 1e-9
+    assert case['init_S'] == pytest.approx(1.0, abs=1e-9)
+    assert case['S_a_min'] == pytest.approx(1.0) == case['S_a_max']
+    assert case['offset_ratio'] == pytest.approx(1.0, abs=1e-3)
+    assert case['combined_ratio_max'] < 1.0
+    # Half a gap of 0.03 deg at the lever arm of an axis, whichever way it is approached.
+    assert 0.0 < case['play_smooth_m'] < 2.0 * 0.5 * 5.3e-4 * case['S_theta_max_m']
+
+
+def test_verdicts_follow_the_measurements(case):
+    found = {claim.key: claim for claim in judge({CaseName('ur5', 'line'): case})}
+    assert found['baseline'].verdict == 'holds'
+    assert found['combined'].verdict == 'does not hold'
+    assert found['smooth_below_aggressive'].verdict.startswith('holds when')
+    turned = judge({CaseName('a', 'b'): {**case, 'distal_ratio': 1.5}})
+    assert {c.key: c.verdict for c in turned}['distal'] == 'holds'
+    split = judge({CaseName('a', 'b'): case, CaseName('c', 'd'): {**case, 'distal_ratio': 1.5}})
+    distal = {c.key: c for c in split}['distal']
+    assert (distal.verdict, distal.held, distal.cases) == ('does not hold', 1, 2)
+    assert f'{case["distal_ratio"]:.2f} to 1.50' in distal.reason

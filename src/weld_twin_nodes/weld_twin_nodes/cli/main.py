@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from types import ModuleType
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import TwinError

@@ -33,7 +33,8 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     with tempfile.TemporaryDirectory() as folder:
         made = _on_bench([each for each in mine if each not in SCENES], Path(folder), tell)
         made['scenes'] = _scenes([each for each in mine if each in SCENES], Path(folder), tell)
-    rows = [*made['faults'], *made['scenes'], made['bag']]
+    made['bags'] = {args.only: made.pop('bag')}
+    rows = [*made['faults'], *made['scenes'], *made['bags'].values()]
     refused = all(row['refused'] for row in made['parameters'])
     return {'passed': refused and all(row['passed'] for row in rows), **made}
 
@@ -149,12 +150,13 @@ def table(result: dict[str, Any]) -> str:
         for each in row['told']
         if each['within_s']
     ]
+    messages = sum(bag['messages'] for bag in result['bags'].values())
     refused = sum(row['refused'] for row in result['parameters'])
     return (
         markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows)
         + '\n'
         + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *scenes)
         + f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
-        f'sentence. The bag has {result["bag"]["messages"]:,} messages; all of them can be '
+        f'sentence. The bags of the whole campaign have {messages:,} messages; all of them can be '
         'read.\n'
     )

@@ -330,9 +330,14 @@ def write_table(path: Path | str, recording: Recording, off: Array) -> None:
     """
     measured = recording.measured
     assert measured is not None
+    write_numbers(path, COLUMNS, [measured.t, measured.position, off, deviation(off)])
+
+
+def write_numbers(path: Path | str, heads: str, columns: Sequence[Array]) -> None:
+    """Write columns of numbers, of one or more each, under heads with commas between, as CSV."""
     text = io.StringIO()
-    rows = np.column_stack([measured.t, measured.position, off, deviation(off)])
-    np.savetxt(text, rows, delimiter=',', header=COLUMNS, comments='', fmt='%.9g')
+    rows = np.column_stack(columns)
+    np.savetxt(text, rows, delimiter=',', header=heads, comments='', fmt='%.9g')
     write_text(path, text.getvalue())
 
 
@@ -387,6 +392,4 @@ def write_prediction_table(path: Path | str, model: Predictor, recording: Record
             flags[(t - t[0] >= start) & (t - t[0] <= end)] = 1.0
         columns += [np.sqrt(expected[1][:, range(6), range(6)]), flags]
         head = f'{POSE},{SIGMA}'
-    text = io.StringIO()
-    np.savetxt(text, np.column_stack(columns), delimiter=',', header=head, comments='', fmt='%.9g')
-    write_text(path, text.getvalue())
+    write_numbers(path, head, columns)

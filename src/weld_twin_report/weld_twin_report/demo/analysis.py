@@ -36,6 +36,7 @@ from weld_twin_msgs_py.messages.topics import (
     TWIN_POSE,
 )
 from weld_twin_nodes.harness import Cell, Tap
+from weld_twin_nodes.offline.prediction import write_numbers
 from weld_twin_nodes.wording.verdict import verdict
 
 from ..report.diagnosis_files import PAGE, write_results
@@ -243,12 +244,8 @@ def write_table(job: Job, _: object) -> None:
     """Write ``deviation.csv`` and ``summary.txt``."""
     measured = job.recording.measured
     assert measured is not None
-    rows = np.column_stack(
-        [measured.t, job.deviation, job.seam_deviation, deviation(job.deviation)]
-    )
-    np.savetxt(
-        job.folder / 'deviation.csv', rows, delimiter=',', header=COLUMNS, comments='', fmt='%.9g'
-    )
+    columns = [measured.t, job.deviation, job.seam_deviation, deviation(job.deviation)]
+    write_numbers(job.folder / 'deviation.csv', COLUMNS, columns)
     job.lines = _summary(job) + job.lines
     write_text(job.folder / MARK, '\n'.join(job.lines) + '\n')
 

@@ -35,7 +35,7 @@ from .acceptance import mark
 from .answer import Answer
 from .cause_answer import LEVEL_HEADS, CauseAnswer
 from .charts import Axis, Line, chart, curve_figure, furthest_off
-from .html import Child, Html, bars, joined, lines, pairs, section, sentences, table, tag
+from .html import Bar, Child, Html, bars, joined, lines, pairs, section, sentences, table, tag
 from .page_data import along, drawn, static
 from .seam_view import at_rest
 from .to_do import reason_and_joints, untried, warned
@@ -83,26 +83,16 @@ def _against(shown: list[CauseAnswer]) -> str:
 
 def _shares(answer: Answer, shown: list[CauseAnswer], rest: list[CauseAnswer]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
-    rows: list[tuple[str, float, str, str]] = []
+    rows: list[Bar] = []
     for rank, reported in enumerate(shown, 1):
         value, ends = answer.share_of(reported)
         label = f'{rank}. {cause_name(answer.diagnosis, reported.cause)}'
-        rows.append((label, reported.cause.share, f'{value} ({ends})', 'cause'))
+        rows.append(Bar(label, reported.cause.share, f'{value} ({ends})', 'cause'))
     smaller = sum(reported.cause.share for reported in rest)
     if smaller > 0.0:
-        rows.append(('smaller causes', smaller, answer.percent(smaller), 'cause'))
-    rows += [(name, share, answer.percent(share), 'rest') for name, share in answer.remainder]
-    items = [
-        tag(
-            'li',
-            tag('span.label', label),
-            tag('span.track', tag('i', style=f'width:{100.0 * share:.2f}%')),
-            tag('span.figure', text),
-            class_=kind,
-        )
-        for label, share, text, kind in rows
-    ]
-    return tag('ul.bars.wide.shares', *items)
+        rows.append(Bar('smaller causes', smaller, answer.percent(smaller), 'cause'))
+    rows += [Bar(name, share, answer.percent(share), 'rest') for name, share in answer.remainder]
+    return bars(rows, 'wide shares')
 
 
 def _card(answer: Answer, reported: CauseAnswer, rank: int) -> Html:
@@ -418,11 +408,12 @@ def _waterfall(diagnosis: Diagnosis) -> Html:
     largest = max(*(rms for _, rms in steps), diagnosis.gap.noise_floor_m, 1e-12)
     rows, before = [], steps[0][1]
     for k, (name, rms) in enumerate(steps):
-        rows.append(_step(('+ ' if k else '') + name, rms / largest, before / largest, rms))
+        fallen = max(before - rms, 0.0) / largest
+        rows.append(Bar('+ ' * (k > 0) + name, rms / largest, millimetres(rms), '', fallen))
         before = rms
     floor = diagnosis.gap.noise_floor_m
-    rows.append(_step('measuring noise', floor / largest, floor / largest, floor, 'floor'))
-    return tag('ul.bars.waterfall.wide', *rows)
+    rows.append(Bar('measuring noise', floor / largest, millimetres(floor), 'floor', 0.0))
+    return bars(rows, 'waterfall wide')
 
 
 def _apart(diagnosis: Diagnosis) -> bool:
@@ -455,18 +446,3 @@ def _judged(diagnosis: Diagnosis) -> str:
 def _readable(name: str) -> str:
     effect, _, joint = name.partition(' of ')
     return cause(effect, joint or None)
-
-
-def _step(label: str, share: float, before: float, rms: float, class_: str = '') -> Html:
-    fallen = max(before - share, 0.0)
-    return tag(
-        'li',
-        tag('span.label', label),
-        tag(
-            'span.track',
-            tag('i', style=f'width:{100 * share:.2f}%'),
-            tag('i.fallen', style=f'width:{100 * fallen:.2f}%'),
-        ),
-        tag('span.figure', millimetres(rms)),
-        class_=class_ or None,
-    )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 _EMPTY = frozenset({'br', 'meta', 'input'})
 
@@ -78,20 +78,29 @@ def columns(
     return table(shown, ([show(item) for show in shown.values()] for item in items), class_)
 
 
-def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
-    """Return horizontal bars: label, length as a share of the full width, text."""
+class Bar(NamedTuple):
+    """A horizontal bar: its label, its length as a share of the full width, and a text."""
+
+    label: str
+    share: float
+    text: str
+    kind: str = ''  # class of its row
+    fallen: float | None = None  # length that is drawn behind it as what has gone
+
+
+def bars(rows: Iterable[tuple[str, float, str] | Bar], class_: str = '') -> Html:
+    """Return horizontal bars, a row each."""
     out = []
-    for label, share, text in rows:
-        width = f'width:{100.0 * min(max(share, 0.0), 1.0):.2f}%'
-        out.append(
-            tag(
-                'li',
-                tag('span.label', label),
-                tag('span.track', tag('i', style=width)),
-                tag('span.figure', text),
-            )
-        )
+    for label, share, text, kind, fallen in (Bar(*row) for row in rows):
+        gone = None if fallen is None else tag('i.fallen', style=_width(fallen))
+        track = tag('span.track', tag('i', style=_width(share)), gone)
+        parts = (tag('span.label', label), track, tag('span.figure', text))
+        out.append(tag('li', *parts, class_=kind or None))
     return tag('ul', *out, class_=f'bars {class_}'.strip())
+
+
+def _width(share: float) -> str:
+    return f'width:{100.0 * min(max(share, 0.0), 1.0):.2f}%'
 
 
 Figure = tuple[str, Child, Child]

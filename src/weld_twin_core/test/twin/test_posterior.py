@@ -163,6 +163,18 @@ def test_a_joint_gives_when_it_is_accelerated_as_far_as_its_spring_lets_it():
     assert not known.pose_covariance(Features(twin, still, still.joints.t)).any()
 
 
+def test_a_corner_of_a_motion_is_no_endless_acceleration():
+    """A joint that sets out at 1 rad/s from one millisecond to the next: no spring follows so fast."""
+    robot = load('ur5')
+    t = np.arange(0.0, 2.0, 1e-3)
+    q = np.tile([0.0, -1.0, 1.2, -0.5, 0.3, 0.0], (t.size, 1))
+    q[:, 0] = np.maximum(t - 1.0, 0.0)
+    corner = Features(Twin(robot), Recording('corner', JointMotion(t, q)), t)
+    # One radian per second within six hundredths of a second.
+    assert np.abs(corner.acceleration).max() == pytest.approx(1.0 / 0.06, rel=0.02)
+    assert np.abs(corner.acceleration[np.abs(t - 1.0) > 0.1]).max() < 1e-6
+
+
 def test_a_model_is_less_sure_the_farther_it_is_from_what_was_recorded():
     robot = load('ur5')
     narrow = tuple(((-0.5, 0.5),) for _ in range(6))

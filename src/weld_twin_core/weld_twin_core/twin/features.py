@@ -24,6 +24,9 @@ from .memory import Picker
 from .stages import Evaluation, load_torque
 from .twin import Twin
 
+SLOW = 0.03
+"""Half of the time [s] over which a joint's acceleration is taken: a spring that swings at 10 to 50 Hz
+follows no faster, and neither a corner of a program nor an encoder's noise is an acceleration."""
 Remembered = tuple[bytes, str, bytes]
 """Instants looked at, effect and its parameters to the last digit."""
 
@@ -79,11 +82,12 @@ class Features:
 
     @cached_property
     def acceleration(self) -> Array:
-        """Return how every joint is accelerated at the stamps, shape (M, n) [rad/s^2]; 0 at rest."""
-        motion = self.recording.joints
-        if motion.static or motion.t.size < 2:
-            return np.zeros((self.at.size, motion.q.shape[1]))
-        return self._picker.take(np.gradient(motion.velocity, motion.t, axis=0))
+        """Return how springs see joints accelerated at the stamps, shape (M, n) [rad/s^2]."""
+        motion, t = self.recording.joints, self.run.view.t
+        low, high = (np.clip(t + way, *motion.t[[0, -1]]) for way in (-SLOW, SLOW))
+        span = (high - low)[:, None]
+        change = motion.at(high)[1] - motion.at(low)[1]
+        return np.divide(change, span, out=np.zeros_like(change), where=span > 0.0)
 
     def column(self, channel: Channel) -> Array:
         """Return d pose / d channel, shape (6, M)."""

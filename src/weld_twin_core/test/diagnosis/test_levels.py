@@ -252,3 +252,22 @@ def test_how_a_set_up_moved_is_no_cause_of_its_own():
     (cause,) = found.causes
     assert cause.place[0][0] == 'base' and cause.dependence[0][0] == 'time'
     assert [site.effect for site, _ in cause.name] == ['frame_curve']
+
+
+def test_a_base_that_leans_to_one_side_alone_is_no_instrument():
+    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(3)
+    t = 20.0 * np.arange(60)
+    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
+    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    still = wt.Twin(robot).poses(commanded, t).position
+    leaning = wt.effects.PedestalTilt(compliance=(8e-6, 0.0))
+    leans = wt.Twin(robot, [leaning]).poses(commanded, t).position - still
+    # About x the base gives only where the arm pulls it to its left.
+    there = still + leans * (still[:, 1:2] > 0.0)
+    seen = commanded.with_measured(
+        wt.Measurements(t, there + [2.1, -1.3, 0.4] + rng.normal(scale=2e-5, size=there.shape))
+    )
+    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    places = {cause.place[0][0] for cause in found.causes if cause.share > 0.1}
+    assert places == {'base'}
+    assert {cause.dependence[0][0] for cause in found.causes if cause.share > 0.1} == {'load'}

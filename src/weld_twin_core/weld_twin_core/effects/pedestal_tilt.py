@@ -63,7 +63,7 @@ class PedestalTilt(LinearEffect):
         axes = view.robot.T_base_foot[:3, :2].T
         return [
             {channel: share * moment for channel, share in lean.items()}
-            for lean, moment in zip(base_leans(view.robot, axes), _moments(view), strict=True)
+            for lean, moment in zip(base_leans(view.robot, axes), base_moments(view), strict=True)
         ]
 
     @classmethod
@@ -72,7 +72,7 @@ class PedestalTilt(LinearEffect):
         reason = super().applicable(view, joint)
         if reason is not None:
             return reason
-        moment = np.stack(_moments(view))
+        moment = np.stack(base_moments(view))
         change = np.linalg.norm(np.ptp(moment, axis=-1))
         if change <= _CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
             return 'the moment on the pedestal does not change'
@@ -87,8 +87,8 @@ class PedestalTilt(LinearEffect):
         )
 
 
-def _moments(view: View) -> tuple[Array, Array]:
-    """Return the moments about the base's x and y, each shape (..., N) [N m]."""
+def base_moments(view: View) -> tuple[Array, Array]:
+    """Return the moments about the base's x and y that the arm and its load make, (..., N) [N m]."""
     moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
     axes = wrench_rotation(view.robot, view.frames, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))

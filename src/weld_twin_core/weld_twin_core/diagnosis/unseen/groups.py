@@ -26,6 +26,7 @@ from ...arrays import Array
 from ...effects.associative_scan import play
 from ...effects.curves import QUANTITIES, FrameCurve, JointCurve, basis
 from ...effects.effect import Effect
+from ...effects.pedestal_tilt import PedestalTilt, base_leans, base_moments
 from ...twin.features import Features
 from ...twin.memory import Picker
 from ..algebra.problem import Model, Problem, Scale
@@ -226,6 +227,8 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
             yield 'instrument', 'place', [_sighted(maker, knots) for maker in features], ()
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(maker) for maker in features], ()
+    if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
+        yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
         weighed = [(maker, _torque(maker)) for maker in features]
         # Every joint bent by a mass at the tool; and what that does through the springs that are known.
@@ -283,6 +286,20 @@ def _yielding(maker: Features) -> Array:
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
     return out
+
+
+def _leaning(maker: Features) -> Array:
+    """Return the base leaning under the arm's weight, more to one side than the other, (8, 6, M)."""
+    view = maker.view
+    moments = [m for moment in base_moments(view) for m in (moment, np.abs(moment))]
+    leans = base_leans(view.robot, view.robot.T_base_foot[:3, :2].T)
+    return maker.changes(
+        [
+            {channel: share * moment for channel, share in lean.items()}
+            for lean in leans
+            for moment in moments
+        ]
+    )
 
 
 def _spaced(values: list[Array], count: int, least: float) -> tuple[float, ...] | None:

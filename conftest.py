@@ -194,6 +194,7 @@ def kept(request):
 
     def hold(name, text, base=None):
         text = page_text(text) if text.startswith('<!doctype html>') else text
+        text = text.replace('\r\n', '\n')  # as languages of programs have it
         if base is not None:
             both = base.splitlines(), text.splitlines()
             text = '\n'.join(list(difflib.unified_diff(*both, n=0, lineterm=''))[2:]) + '\n'

@@ -49,7 +49,7 @@ def stations(robot, tmp_path):
 
 
 @pytest.mark.parametrize('language', CELLS)
-def test_every_station_is_reached_and_the_instrument_told(language, tmp_path):
+def test_every_station_is_reached_and_the_instrument_told(language, tmp_path, kept):
     robot = wt.load(CELLS[language][0])
     path, q = stations(robot, tmp_path)
     _, text, places, rounding = exported(language, path, tmp_path, '--trigger', 7)
@@ -60,12 +60,17 @@ def test_every_station_is_reached_and_the_instrument_told(language, tmp_path):
         r'set_digital_out\(7, True\)|\$OUT\[7\] = TRUE|doTracker7, 1|OT#\(7\) ON|DO\[7\]=ON', text
     )
     assert len(triggers) == (0 if language in ('joint-trajectory', 'csv') else 5)
-    assert (tmp_path / f'measure.{CELLS[language][1]}.md').is_file()
+    notes = (tmp_path / f'measure.{CELLS[language][1]}.md').read_text(encoding='utf-8')
+    kept(f'stations_{language}', f'{text}\n{notes}'.replace(str(tmp_path), ''))
 
 
 @pytest.mark.parametrize('language', CELLS)
-def test_a_seam_is_followed_by_straight_pieces_to_a_twentieth_of_a_millimetre(language, tmp_path):
-    robot, _, places, _ = exported(language, 'arc', tmp_path)
+def test_a_seam_is_followed_by_straight_pieces_to_a_twentieth_of_a_millimetre(
+    language, tmp_path, kept
+):
+    robot, text, places, _ = exported(language, 'arc', tmp_path)
+    lines = text.splitlines()
+    kept(f'seam_{language}', '\n'.join([*lines[:25], '...', *lines[-8:]]) + '\n')
     tool = robot.T_flange_tool
     poses = [tool_pose(robot, p, tool) if p.ndim == 1 else p for p in places]
     points = np.array([pose[:3, 3] for pose in poses])

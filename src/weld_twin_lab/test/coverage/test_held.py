@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.blind.blind_cell import BlindCell, Take
 from weld_twin_lab.blind.deck import Lot
-from weld_twin_lab.blind.making import SealedCase
+from weld_twin_lab.blind.making import SealedCase, one_arm
 from weld_twin_lab.coverage.held import inside_region
 from weld_twin_lab.coverage.oracle import oracle_sigma
 from weld_twin_lab.coverage.sealed import of_case
@@ -110,3 +111,15 @@ def test_promises_of_a_sealed_cell_hold_where_the_tool_really_is_and_are_sharp()
     ((before,), (after,)) = (told['promises'][f'path {when}'] for when in ('before', 'after'))
     assert np.ptp(before['ci90']) < before['true']
     assert after['true'] < before['true'] and after['ci90'][1] < before['ci90'][0]
+
+
+def test_a_hose_of_a_sealed_arm_hangs_where_it_hung_in_the_recording():
+    robot = load('ur5')
+    q = np.linspace(-0.4, 0.8, 5)[:, None] * np.ones((1, robot.n))
+    train = Take(Command(np.arange(5.0), q, True), 0)
+    hose = {'effect': 'dress_pack', 'joint': 'elbow_joint', 'amplitude': 1e-3}
+    case = SealedCase(
+        LOT, BlindCell(robot, Tracker()), [hose], [], [], (), train, train, train, False
+    )
+    (own,) = one_arm(case).causes
+    assert np.allclose([own['middle'], own['reach']], [0.2, 0.6])

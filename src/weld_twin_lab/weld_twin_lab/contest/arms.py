@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -14,16 +16,19 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.markdown import table
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.yaml_file import yaml_text
 
-from ..blind.achieved import measured_of
-from ..real_arms.splits import all_splits
+from ..real_arms.splits import Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit
-from .case import case_of, put
 from .course import Run
+from .open_form import write_case
 
 KINDS = ('n30', 'wrist_10deg', 'octant_0', 'odd')
 """Splits that are asked: few stations, two narrow regions that are asked about outside, and half
 of all."""
+MEASURED = 'measured.json'
+"""Where the tool was at the times asked for, beside the cases and not in them."""
 Errors = dict[str, dict[str, float]]
 """Mean errors [m] by method and case."""
 
@@ -33,28 +38,45 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     Write the cases of both arms; return what was measured where they ask, (M, 3) [m], by name.
 
     Nobody measured base and tool frame; the nominal arm's are fitted on the stations of the case,
-    the same for all methods. They are told as frames that are not known. Where a region was left, it
-    is asked outside of it.
+    the same for all methods. They are told as frames that are not known.
 
     ur5, ur10: directories of the published tables; see docs/real_arms.md.
+    out: cases that are there already are left as they are.
 
     Raises DataError: a table is missing or cannot be read.
     """
-    measured = {}
+    out.mkdir(parents=True, exist_ok=True)
+    if (out / MEASURED).exists():
+        kept = json.loads((out / MEASURED).read_text(encoding='utf-8'))
+        return {name: np.array(rows) for name, rows in kept.items()}
+    measured: dict[str, Array] = {}
     for split in all_splits(ur5, ur10):
         if split.kind in KINDS:
-            ask = split.inside if split.outside is None else split.outside
-            assert ask is not None
-            framed = plain_fit(split.train, catalog.load(split.robot), (), ALIGN)
-            robot = framed.robot.with_frames(base=framed.bases[0])
-            put(out / split.name, case_of(robot, _places(split.train), ask, tuple(sorted(ALIGN))))
-            measured[split.name] = measured_of(ask).position
+            measured[split.name] = _written(split, out / split.name)
+    content = {name: rows.tolist() for name, rows in measured.items()}
+    write_text(out / MEASURED, json.dumps(content) + '\n')
     return measured
+
+
+def _written(split: Split, folder: Path) -> Array:
+    """Write a case; return what it asks for. Where a region was left, it is asked outside of it."""
+    ask = split.inside if split.outside is None else split.outside
+    assert ask is not None
+    assert ask.measured is not None
+    framed = plain_fit(split.train, catalog.load(split.robot), (), ALIGN)
+    robot = framed.robot.with_frames(base=framed.bases[0])
+    with TemporaryDirectory() as place:
+        file = Path(place) / 'robot.yaml'
+        write_text(file, yaml_text(robot.to_mapping()))
+        said = {'align': sorted(ALIGN), 'exclude': [], 'known': ''}
+        write_case(folder, file, (_places(split.train), ask), said)
+    return np.asarray(ask.measured.position)
 
 
 def _places(recording: Recording) -> Recording:
     """Return the recording without orientations: few methods can use them."""
-    return recording.with_measured(replace(measured_of(recording), rotation=None))
+    assert recording.measured is not None
+    return recording.with_measured(replace(recording.measured, rotation=None))
 
 
 def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) -> Errors:

@@ -1,30 +1,42 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sealed cases as methods see them, and every method run on them, each in its own process."""
+"""Sealed cases put into the open form, and every method run on them, each in its own process."""
 
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 
 from ..benchmark.costs import cost_of
 from ..blind import layout
-from .case import ContestAnswer, answer_at, case_at, case_of, put
-from .entrants import ENTRANTS, entrant
+from .open_form import ContestAnswer, read_answer, write_case
 
-ANSWER, SAID = 'answer', 'said.txt'
-"""What a method answered, and what it printed while it worked."""
+ENTRANTS = (
+    'weld_twin',
+    'geometry',
+    'zero_offset',
+    'sparse_regression',
+    'gaussian_process',
+    'bayesian_linear',
+    'bootstrap',
+    'boosted_trees',
+    'never_knows',
+)
+"""Methods of the repository, a file each in `entrants`."""
+SAID = 'said.txt'
+"""What a method printed while it worked."""
 LIMIT = 300.0
 """Seconds an answer may take; a fit that has not ended by then has lost its way."""
 RUN = 'run.json'
@@ -44,19 +56,9 @@ class Run:
     """Why there is no answer."""
 
 
-class Ended(NamedTuple):
-    """How a run ended."""
-
-    seconds: float
-    """Of processor time, the start of the interpreter and its imports included [s]."""
-    memory_bytes: int
-    trouble: str = ''
-    """The last that it said where it failed; empty where it did not."""
-
-
 def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     """
-    Make sealed cases what methods see; return their names.
+    Put sealed cases into the open form; return their names.
 
     cases, truths: as ``weld-twin lab blind make`` writes them. Of the truths, only what was
     commanded while the tool was measured is used.
@@ -67,50 +69,56 @@ def opened(cases: Path, truths: Path, out: Path) -> list[str]:
         if (out / name).exists():
             continue
         said = layout.read(cases / name / layout.CASE)
-        robot = load_robot(str(cases / name / layout.ROBOT))
-        train, ask = (
-            _sent(read_recording(place / name / use, robot))
-            for place, use in ((cases, layout.TRAIN), (truths, layout.TEST))
-        )
-        known = (cases / name / layout.KNOWN).resolve() if said['known'] else None
-        exclude = tuple(said['exclude'])
-        put(
+        file = cases / name / layout.ROBOT
+        robot = load_robot(str(file))
+        train = read_recording(cases / name / layout.TRAIN, robot)
+        ask = read_recording(truths / name / layout.TEST, robot)
+        known = (cases / name / layout.KNOWN).read_text(encoding='utf-8') if said['known'] else ''
+        write_case(
             out / name,
-            case_of(robot, train, ask, tuple(said['align']), exclude=exclude, known=known),
+            file,
+            (train, ask),
+            {'align': said['align'], 'exclude': said['exclude'], 'known': known},
         )
     return names
 
 
-def _sent(one: Recording) -> Recording:
-    """Return what was commanded and measured in a recording, and nothing that a reader adds."""
-    return Recording(
-        one.name, one.joints, one.measured, one.wrench, one.wrench_frame, one.temperature
-    )
-
-
-def loaded(names: Sequence[str]) -> None:
+def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
     """
-    Refuse methods that cannot take part.
+    Return the command of every method, with {case} and {out} in it.
 
-    Raises DataError: there is no such entrant, or it cannot be loaded.
+    names: of `ENTRANTS`.
+    entered: others, as NAME=COMMAND.
+
+    Raises DataError: there is no such entrant, or it cannot be loaded, or a command does not say
+    where case and answer go.
     """
+    out: dict[str, list[str]] = {}
     for name in names:
         if name not in ENTRANTS:
             raise DataError(f'no entrant is called {name!r}; there are {", ".join(ENTRANTS)}')
         try:
-            entrant(name)
+            import_module(f'{__package__}.entrants.{name}')
         except ImportError as error:
             raise DataError(
                 f'the method {name!r} cannot be loaded ({error}); run '
                 "pip install 'weld-twin[bench,contest]', or leave it out of --entrants"
             ) from None
+        out[name] = [sys.executable, '-m', str(__package__), name, '{case}', '{out}']
+    for text in entered:
+        name, _, command = text.partition('=')
+        if not name or '{case}' not in command or '{out}' not in command:
+            raise DataError(f'--enter takes NAME=COMMAND with {{case}} and {{out}}, got {text!r}')
+        out[name] = shlex.split(command)
+    return out
 
 
 def run_all(
     cases: Path,
-    names: Sequence[str],
-    methods: Sequence[str],
+    names: list[str],
+    methods: Mapping[str, Sequence[str]],
     out: Path,
+    counts: Mapping[str, int],
     tell: Callable[[str], None],
 ) -> dict[str, dict[str, Run]]:
     """
@@ -120,17 +128,20 @@ def run_all(
     """
     runs: dict[str, dict[str, Run]] = {method: {} for method in methods}
     for name in names:
-        count = case_at(cases / name).times.size
-        for method in methods:
+        for method, words in methods.items():
             place = out / method / name
             if not (place / RUN).exists():
-                shutil.rmtree(place, ignore_errors=True)
-                place.mkdir(parents=True)
-                end = ended([sys.executable, '-m', str(__package__), method], cases / name, place)
-                write_text(place / RUN, json.dumps(end._asdict(), indent=1) + '\n')
-            runs[method][name] = _kept(place, count)
+                _start(words, cases / name, place)
+            runs[method][name] = _kept(place, counts[name])
         tell(name)
     return runs
+
+
+def _start(words: Sequence[str], case: Path, place: Path) -> None:
+    """Have a case answered, and keep what that took."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    write_text(place / RUN, json.dumps(ended(words, case, place)._asdict(), indent=1) + '\n')
 
 
 def _kept(place: Path, count: int) -> Run:
@@ -140,21 +151,36 @@ def _kept(place: Path, count: int) -> Run:
     if end.trouble:
         return Run(None, *used, end.trouble)
     try:
-        return Run(answer_at(place / ANSWER, count), *used)
+        return Run(read_answer(place, count), *used)
     except DataError as error:
         return Run(None, *used, str(error))
+
+
+class Ended(NamedTuple):
+    """How a run ended."""
+
+    seconds: float
+    """Of processor time, the start of the interpreter and its imports included [s]."""
+    memory_bytes: int
+    trouble: str = ''
+    """The last that it said where it failed; empty where it did not."""
 
 
 def ended(words: Sequence[str], case: Path, place: Path) -> Ended:
     """
     Have the answer to a case written to a place.
 
-    words: what is started, with the case and where the answer goes after them.
+    words: the command of a method, with {case} and {out} in it.
     """
+    filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
     with (place / SAID).open('w', encoding='utf-8') as said:
-        code, cost = cost_of([*words, str(case), str(place / ANSWER)], said=said, limit=LIMIT)
-    trouble = ''
-    if code:
-        lines = (place / SAID).read_text(encoding='utf-8').strip().splitlines()
-        trouble = lines[-1] if lines else f'exit code {code}'
-    return Ended(cost.cpu, int(cost.peak), trouble)
+        code, cost = cost_of(filled, said=said, limit=LIMIT)
+    return Ended(cost.cpu, int(cost.peak), _trouble(place, code))
+
+
+def _trouble(place: Path, code: int) -> str:
+    """Return the last line that a program said before it failed; nothing where it did not."""
+    if code == 0:
+        return ''
+    lines = (place / SAID).read_text(encoding='utf-8').strip().splitlines()
+    return lines[-1] if lines else f'exit code {code}'

@@ -10,20 +10,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr
 
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
-from ..blind.achieved import counted
+from ..blind.achieved import NORMAL_90, counted
 from ..blind.ambiguous import Site
 from ..blind.displacement import rms
 from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
 from ..study import tabled
-from .case import Cause, ContestAnswer, Name
 from .course import Run
+from .open_form import Cause, ContestAnswer, Name
 
+DENSITY, APART = 1.0 / np.sqrt(2.0 * np.pi), 1.0 / np.sqrt(np.pi)
+"""Of a normal distribution of unit width: its density in the middle, and half the mean distance of two
+draws."""
 LIKELY = 0.5
 """Probability from which something is said to be there."""
 NAMES = 3
@@ -59,7 +63,15 @@ def sealed(cases: Path, truths: Path, name: str, nominal: Array) -> Sealed:
 
 @dataclass(frozen=True)
 class Point:
-    """What one answer was worth; None where the question does not arise."""
+    """
+    What one answer was worth; None where the question does not arise.
+
+    References
+    ----------
+    .. [1] T. Gneiting, A. E. Raftery, "Strictly proper scoring rules, prediction, and estimation",
+       Journal of the American Statistical Association 102, 2007, equation 21.
+
+    """
 
     detected: bool | None
     false_alarm: bool | None
@@ -72,6 +84,24 @@ class Point:
     """Gap with the prediction over the gap of the nominal arm."""
     over_floor: float
     """Gap with the prediction over what the true causes would leave."""
+    held: float | None = None
+    width_m: float | None = None
+    crps_m: float | None = None
+    """Share of the measured coordinates within their 90 % interval; the median of its width; and
+    the mean continuous ranked probability score, which is less the sharper and the truer an answer
+    is [1]_. None where a method does not say how sure it is."""
+
+
+def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
+    """
+    Return the share held by 90 % intervals, their median width and the mean CRPS of normal answers.
+
+    off, sigma: measured minus predicted, and how sure that was said to be, shape (M, 3) [m].
+    """
+    z = off / sigma
+    score = sigma * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * DENSITY * np.exp(-0.5 * z**2) - APART)
+    covered = float((np.abs(z) <= NORMAL_90).mean())
+    return covered, 2.0 * NORMAL_90 * float(np.median(sigma)), float(score.mean())
 
 
 def point(answer: ContestAnswer, case: Sealed) -> Point:
@@ -93,7 +123,14 @@ def point(answer: ContestAnswer, case: Sealed) -> Point:
         _sure_wrong(answer, case),
         gap / case.nominal_m,
         gap / float(truth['floor_m']),
+        *_promises(answer, case),
     )
+
+
+def _promises(answer: ContestAnswer, case: Sealed) -> tuple[float | None, ...]:
+    if answer.sigma is None:
+        return None, None, None
+    return promised((case.positions - answer.predicted)[case.good], answer.sigma[case.good])
 
 
 def _first(answer: ContestAnswer, count: int) -> list[Name]:
@@ -132,13 +169,14 @@ def _sure_wrong(answer: ContestAnswer, case: Sealed) -> bool:
     return denied or any(not right & set(group) for group in sure)
 
 
-def page(summaries: Mapping[str, Mapping[str, Any]], nominal: str) -> str:
+def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nominal: str) -> str:
     """
     Return the table of all methods in Markdown.
 
     nominal: what is said of a method that gave no answer: it is taken for the nominal arm, silent.
     """
-    return tabled(COLUMNS, summaries.items()) + f'\n{nominal}\n'
+    rows = [(method, summary(said, cases)) for method, said in runs.items()]
+    return tabled(COLUMNS, rows) + f'\n{nominal}\n'
 
 
 def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, Any]:
@@ -151,6 +189,9 @@ def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, A
     remaining = np.array([each.left for each in points])
     out['left'] = float(np.median(remaining)) if points else None
     out['over_floor'] = float(np.median([p.over_floor for p in points])) if points else None
+    for key in ('held', 'width_m', 'crps_m'):
+        given = [getattr(each, key) for each in points if getattr(each, key) is not None]
+        out[key] = None if not given else float((np.mean if key == 'held' else np.median)(given))
     out['worse_than_nominal'] = int((remaining > 1.0).sum())
     out['seconds'] = float(np.median([run.seconds for run in runs.values()]))
     out['memory_bytes'] = float(np.median([run.memory_bytes for run in runs.values()]))
@@ -161,8 +202,8 @@ def _share(value: float | None) -> str:
     return '-' if value is None else f'{100.0 * value:.0f} %'
 
 
-def _number(value: float | None) -> str:
-    return '-' if value is None else f'{value:.2f}'
+def _number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
+    return '-' if value is None else f'{value / unit:.{digits}f}'
 
 
 COLUMNS: dict[str, Callable[[Any], object]] = {
@@ -177,6 +218,9 @@ COLUMNS: dict[str, Callable[[Any], object]] = {
     'gap left, median': lambda row: _number(row[1]['left']),
     'over the floor, median': lambda row: _number(row[1]['over_floor']),
     'worse than nominal': lambda row: row[1]['worse_than_nominal'],
+    '90 % hold': lambda row: _share(row[1]['held']),
+    'their width [mm]': lambda row: _number(row[1]['width_m'], 3, 1e-3),
+    'CRPS [mm]': lambda row: _number(row[1]['crps_m'], 3, 1e-3),
     'processor [s]': lambda row: f'{row[1]["seconds"]:.1f}',
     'memory [MB]': lambda row: f'{row[1]["memory_bytes"] / 1e6:.0f}',
 }

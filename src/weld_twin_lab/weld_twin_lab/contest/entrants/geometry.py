@@ -16,7 +16,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 
-from ..case import ContestAnswer, ContestCase
+from ..open_form import ContestAnswer, ContestCase
 
 FAMILY = {'a': 'link_length', 'd': 'link_length', 'alpha': 'link_twist', 'theta': 'joint_offset'}
 """What a library of effects calls an error of each DH value."""
@@ -41,17 +41,14 @@ class Fitted:
     robot: Robot
 
 
-def zero_offset(case: ContestCase) -> ContestAnswer:
-    """Return the joint whose zero moves the tool most, without a doubt: what mastering can do."""
-    fitted = fit(case, ('theta',))
-    row = int(fitted.effect[: case.robot.n].argmax())
-    name = 'joint_offset', case.robot.joint_names[row], 1.0
-    return ContestAnswer(_predicted(case, fitted), ((name,),))
-
-
-def geometry(case: ContestCase) -> ContestAnswer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the values that are off, by how far they move the tool."""
-    fitted = fit(case, ALL)
+    return answer_with(case, ALL)
+
+
+def answer_with(case: ContestCase, free: tuple[str, ...]) -> ContestAnswer:
+    """Return what a fit of some of the DH values says."""
+    fitted = fit(case, free)
     moved: dict[tuple[str, str | None], float] = defaultdict(float)
     for (name, row), value, error, effect in zip(
         fitted.names, fitted.values, fitted.errors, fitted.effect, strict=True
@@ -62,13 +59,9 @@ def geometry(case: ContestCase) -> ContestAnswer:
     causes = tuple(
         ((*at, share / whole),) for at, share in sorted(moved.items(), key=lambda item: -item[1])
     )
-    return ContestAnswer(_predicted(case, fitted), causes, none=0.0 if causes else 1.0)
-
-
-def _predicted(case: ContestCase, fitted: Fitted) -> Array:
-    """Return where the fitted arm has the tool, shape (M, 3) [m]."""
     q, _ = case.ask.joints.at(case.times)
-    return np.asarray(forward(fitted.robot, q)[:, :3, 3])
+    predicted = forward(fitted.robot, q)[:, :3, 3]
+    return ContestAnswer(predicted, causes, none=0.0 if causes else 1.0)
 
 
 def fit(case: ContestCase, free: tuple[str, ...]) -> Fitted:

@@ -14,8 +14,8 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ..case import ContestAnswer, ContestCase
-from .learners import nominal, off
+from ..open_form import ContestAnswer, ContestCase
+from .residual import nominal, off
 
 TERMS = ('joint_offset', 'transmission_ripple', 'transmission_ripple', 'servo_lag', 'backlash')
 """What a constant, a sine, a cosine, a velocity and its sign in a joint's error stand for."""
@@ -27,7 +27,7 @@ STEP = 1e-6
 """Of the differences by which a joint's pull on the tool is found [rad]."""
 
 
-def sparse_regression(case: ContestCase) -> ContestAnswer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the terms that are left, by their share in the error, and what they predict."""
     measured = case.measured
     columns = _columns(case, case.train.joints, measured.t)

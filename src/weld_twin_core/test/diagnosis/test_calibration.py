@@ -9,12 +9,12 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.calibration.calibrated import Stated, Statement, calibrated, stated
-from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
+from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_situation, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.result import Cause, Site
+from weld_twin_core.diagnosis.result import Cause, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import Verdict
-from weld_twin_core.diagnosis.verdict.evidence import Row
+from weld_twin_core.diagnosis.verdict.evidence import Evidence, Row
 
 PLAY = Site('backlash', 'elbow_joint')
 
@@ -75,6 +75,34 @@ def test_the_whole_answer_has_the_least_of_its_names():
 def test_log_odds_end_at_a_thousand_to_one():
     assert odds(1.0) == pytest.approx(np.log(999.0))
     assert odds(0.0) == pytest.approx(-np.log(999.0))
+
+
+@pytest.mark.parametrize(
+    ('gain', 'parts', 'structure', 'cancelling'),
+    [
+        (0.1, (0.5, 0.5), -1.0, 0.0),
+        (0.01, (4.0, 6.0), -2.0, 1.0),
+        (0.0, (), -3.0, 0.0),
+        (-0.2, (0.2, 0.3), -3.0, 0.0),
+    ],
+)
+def test_a_share_counts_by_its_logarithm_and_only_what_cancels_is_bad_news(
+    gain, parts, structure, cancelling
+):
+    evidence = Evidence(
+        slots=(),
+        structure=Structure(1e-4, gain, 0.0, ()),
+        gap=1e-3,
+        after=1e-4,
+        floor=1e-4,
+        independent=True,
+        parts=parts,
+        travel=(0.5,),
+    )
+    told = of_situation(evidence, wt.Beliefs())
+    assert told['structure'] == pytest.approx(structure)
+    assert told['cancelling'] == pytest.approx(cancelling)
+    assert told['left unexplained'] == -3.0
 
 
 class _Fit:

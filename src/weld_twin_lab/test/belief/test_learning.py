@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from weld_twin_core.diagnosis.calibration.features import odds
 from weld_twin_core.diagnosis.calibration.weights import calibration_from
 from weld_twin_core.errors import DataError
 from weld_twin_lab.belief.bound import bounded, precise, upper_limit
 from weld_twin_lab.belief.judged import Example
-from weld_twin_lab.belief.learning import count_of, learned
+from weld_twin_lab.belief.learning import count_of, learned, restated
 from weld_twin_lab.belief.logistic import fitted
 from weld_twin_lab.belief.mix import SHARES, mixed
 from weld_twin_lab.belief.terms import TERMS
@@ -79,6 +80,40 @@ def test_a_family_named_alone_counts_where_it_was_seen_often_and_others_do_not()
     weights = learned(rows, {})['statements']['name']['weights']
     assert weights['only backlash']['weight'] < -1.0 < 0.0 < weights['only drift']['weight']
     assert 'only wear' not in weights
+
+
+def test_an_answer_is_learned_from_its_name_as_new_weights_report_it():
+    rows = examples(400, 9, slope=4.0, kinds=('name',))
+    others = tuple(kind for kind in TERMS if kind not in ('name', 'answer, named'))
+    rows += examples(400, 10, kinds=others)
+    name = {e.case: e for e in rows if e.kind == 'name'}
+
+    def answer(case, reported, told=1):
+        own = {'names': float(np.log(reported)), 'least name': odds(reported), 'told': told}
+        features = {**dict.fromkeys(TERMS['answer, named'], 0.0), **own}
+        return Example(case, 'answer, named', features, name[case].right, reported)
+
+    # The weights of its time had no more to say of a name than 0.5, whatever the evidence.
+    rows += [answer(case, 0.5) for case in name]
+    now = [e for e in restated(rows) if e.kind == 'answer, named']
+    p = np.exp([e.features['names'] for e in now])
+    right = np.array([e.right for e in now])
+    assert p[right].mean() > 0.8 > 0.4 > p[~right].mean()
+    assert [e.features['least name'] for e in now] == pytest.approx(np.log(p / (1.0 - p)))
+    # So what is learned of such answers tells them apart as the names do.
+    weights = learned(rows, {})['statements']['answer, named']['weights']
+    assert weights['names']['weight'] + weights['least name']['weight'] > 0.5
+    # One whose names are not all that it says stays.
+    for other in (answer('9/0', 0.7), answer('9/0', 0.5, told=2)):
+        assert restated([*rows, other])[-1] == other
+
+
+def test_what_is_sure_is_read_off_cases_of_today():
+    rows = examples(600, 10, slope=4.0)
+    old = [e._replace(case=f'old/{k}', right=False, weight=0.01) for k, e in enumerate(rows)]
+    alone, both = (learned(own, {}, risk=0.02) for own in (rows, [*rows, *old]))
+    assert alone['card']['bounds']['answer']['cases'] == 4 * 600
+    assert both['card']['bounds']['answer']['cases'] == 4 * 600
 
 
 def test_too_few_cases_are_told_as_sure_of_nothing():

@@ -13,15 +13,6 @@ from weld_twin_core.diagnosis.calibration.features import TOLD_AS
 
 RISK, CAUSE_RISK = 0.0025, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
-SITUATION = {
-    'gap': 1,
-    'structure': -1,
-    'rows': 0,
-    'joints moving': 1,
-    'lacking': -1,
-    'cancelling': -1,
-}
-"""What a diagnosis as a whole shows."""
 NAMES = {
     'names': 1,
     'least name': 1,
@@ -31,19 +22,23 @@ NAMES = {
 }
 """What the names told add up to."""
 NAMED = {
-    **SITUATION,
+    **{name: way for name, way in NAMES.items() if name != 'least size'},
+    'gap': 0,
+    'structure': -1,
+    'rows': 0,
+    'stations': 0,
+    'lacking': -1,
+    'cancelling': -1,
     'left': -1,
     'left unexplained': -1,
-    'stations': 0,
     'instrument and base': -1,
-    **NAMES,
 }
 """What speaks for an answer that names causes; against it speaks that one of them has no name."""
 MANY = {
     'growth': 1,
     'least growth': 1,
     'size': 1,
-    'gap': 0,
+    'rows': 0,
     'structure': -1,
     'kinds': 1,
     'lacking': -1,
@@ -109,7 +104,7 @@ TERMS: dict[str, dict[str, int]] = {
         **NAMES,
     },
     'answer, none': {'structure': -1, 'rows': 0, 'left': -1},
-    'answer, many': {'structure': -1, 'left': -1, 'gap': 0, 'names': 1, 'told': 0},
+    'answer, many': {'structure': -1, 'lacking': -1, 'gap': 0, 'least name': 1, 'told': 0},
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""
 OF_FAMILIES = frozenset({'name', 'nameless'})

@@ -3,9 +3,10 @@
 """
 Features of statements: a few plain numbers that say how far each can be trusted.
 
-Sizes and ratios enter as decimal logarithms, probabilities as log odds, evidence as the logarithm
-of nats. Nothing here says which families were taken out of the library: how often that is done is
-no property of a cell.
+Sizes, ratios and shares of what is left enter as decimal logarithms: a hundredth that something
+regular explains says nearly as much as a tenth. Probabilities enter as log odds, evidence as the
+logarithm of nats. Nothing here says which families were taken out of the library: how often that is
+done is no property of a cell.
 """
 
 from __future__ import annotations
@@ -56,12 +57,13 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
         {
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
-            'left unexplained': Left(evidence, beliefs).share,
-            'structure': evidence.structure.gain,
+            'left unexplained': log(Left(evidence, beliefs).share),
+            'structure': log(evidence.structure.gain),
             'rows': log(evidence.rows),
             'joints moving': float((np.array(evidence.travel) > MOVES).mean()),
             'lacking': float(bool(evidence.lacking)),
-            'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
+            # Effects that work with each other are no better news than those that are apart.
+            'cancelling': log(max(sum(evidence.parts), 1.0)),
             'stations': float(evidence.stations),
             'instrument and base': float({'instrument', 'base'} <= places),
         }

@@ -105,7 +105,11 @@ def _region(
     models: dict[str, Model], train: Recording, stations: Recording, diagnosis: Diagnosis
 ) -> dict[str, Any]:
     """Return the errors of every model on some stations, and how they compare."""
-    sizes = {name: _sizes(residual(model, train, stations)) for name, model in models.items()}
+    allowed = {PRODUCT: diagnosis.posterior}
+    sizes = {
+        name: _sizes(residual(model, train, stations, allowed.get(name)))
+        for name, model in models.items()
+    }
     out: dict[str, Any] = {
         'stations': _count(stations),
         'mean_m': {name: float(size.mean()) for name, size in sizes.items()},
@@ -148,7 +152,9 @@ def _axis(data: str) -> dict[str, Any]:
     out |= said(diagnosis)
     out['found'] = [item.as_dict() for item in diagnosis.effects]
     if diagnosis.status != 'unsound':
-        out['rms_m'][PRODUCT] = _rms(residual(diagnosis.model, train, test)[2])
+        out['rms_m'][PRODUCT] = _rms(
+            residual(diagnosis.model, train, test, diagnosis.posterior)[2]
+        )
     return out
 
 

@@ -260,14 +260,14 @@ def _unseen(one: ArmRow, diagnosis: Diagnosis) -> dict[str, float] | None:
     """Return the RMS error [m] of plain fits and of the diagnosis on what was not fitted."""
     if one.other is None or diagnosis.status == 'unsound':
         return None
-    models: dict[str, Model] = {'product': diagnosis.model}
     if one.other.contacts is not None:
         return {'product': _spread(diagnosis.model, one.other)}
+    fitted, other, allowed = one.fitted, one.other, diagnosis.posterior
+    out = {'product': _rms(residual(diagnosis.model, fitted, other, allowed)[:3])}
     for name, families in PLAIN.items():
-        models[name] = plain_fit(one.fitted, one.robot, families, frozenset(one.align))
-    return {
-        name: _rms(residual(model, one.fitted, one.other)[:3]) for name, model in models.items()
-    }
+        model = plain_fit(fitted, one.robot, families, frozenset(one.align))
+        out[name] = _rms(residual(model, fitted, other)[:3])
+    return out
 
 
 def _spread(model: Model, other: Recording) -> float:

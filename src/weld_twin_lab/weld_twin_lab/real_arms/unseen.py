@@ -78,15 +78,23 @@ def _members(robot: Robot, families: tuple[str, ...]) -> tuple[Effect, ...]:
     )
 
 
-def residual(model: Model, train: Recording, other: Recording) -> Array:
+def residual(
+    model: Model, train: Recording, other: Recording, posterior: Posterior | None = None
+) -> Array:
     """
     Return measured minus predicted, shape (3 or 6, M) [m, rad]; nothing is fitted.
 
     model: fitted on ``train``.
+    posterior: models allowed about it, whose middle predicts, as `weld-twin predict` has it.
     """
     effects = seen_from(model.found, train.epoch_ns, train.span_ns, other)
     there = Model(model.robot, model.bases[:1], model.known, effects)
-    return Problem((usable(other),), ALIGN).residuals(there)[0]
+    problem = Problem((usable(other),), ALIGN)
+    out = problem.residuals(there)[0]
+    if posterior is None:
+        return out
+    shift = posterior.expected(problem.features(there)[0]).shift.T
+    return np.asarray(out - shift[: len(out)])
 
 
 def flagged(posterior: Posterior, other: Recording, t: Array) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,12 +14,14 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.curved import no_noise
+from weld_twin_core.diagnosis.levels.curved import no_noise, placed
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
+from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Verdict
+from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.effects.curves import JointCurve, basis
 
 NOISE = 2e-5
@@ -271,3 +274,42 @@ def test_a_base_that_leans_to_one_side_alone_is_no_instrument():
     places = {cause.place[0][0] for cause in found.causes if cause.share > 0.1}
     assert places == {'base'}
     assert {cause.dependence[0][0] for cause in found.causes if cause.share > 0.1} == {'load'}
+
+
+def test_what_is_far_wider_than_noise_is_told_as_above_it():
+    """A dent at one angle of a joint, seen at stations where nothing shows the noise by itself."""
+    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(6)
+    t = 20.0 * np.arange(60)
+    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
+    dent = np.zeros_like(q)
+    dent[:, 1] = 1.2e-3 * np.exp(-0.5 * ((q[:, 1] - 0.4) / 0.15) ** 2)
+    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    there = wt.Recording('real', wt.JointMotion(t, q + dent, static=True))
+    position = wt.Twin(robot).poses(there, t).position
+    position += rng.normal(scale=3e-5, size=position.shape)
+    seen = commanded.with_measured(wt.Measurements(t, position + [2.1, -1.3, 0.4]))
+    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    assert found.status == 'unknown' and found.unexplained.above_noise
+    (cause,) = found.causes
+    assert (cause.place[0][0], cause.dependence[0][0]) == (robot.joint_names[1], 'angle')
+
+
+def test_what_is_left_beside_a_model_has_a_place_where_no_curve_explains_the_gap():
+    rest = {('elbow', 'angle'): 0.6, ('wrist', 'angle'): 0.1}
+    evidence = Evidence(
+        slots=(),
+        structure=Structure(5e-5, 0.6, 5.0, ('angle at elbow', 'angle at wrist'), of_rest=rest),
+        gap=3e-4,
+        after=8e-5,
+        floor=2e-5,
+        independent=True,
+        parts=(),
+    )
+    form = placed(SimpleNamespace(dense=False), Verdict('unknown'), None, evidence, wt.Beliefs())
+    (part,) = form.parts
+    assert (form.gain, form.steady, str(part.group)) == (0.6, 5.0, 'elbow, depending on angle')
+    # What nothing takes off may be anywhere.
+    assert part.weight_of('at') == pytest.approx({'elbow': 0.6 / 1.1, 'wrist': 0.1 / 1.1})
+    noise = replace(evidence, structure=replace(evidence.structure, gain=0.01))
+    nothing = placed(SimpleNamespace(dense=False), Verdict('unknown'), None, noise, wt.Beliefs())
+    assert nothing.parts == ()

@@ -209,7 +209,7 @@ def _told(
     alternative = curved(result, verdict, beliefs)
     verdict = no_noise(verdict, alternative, beliefs)
     unseen.forget_other_parts()
-    places = placed(result, verdict, alternative, evidence.scattered, beliefs)
+    places = placed(result, verdict, alternative, evidence, beliefs)
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)

@@ -229,7 +229,7 @@ def _unexplained(
     names = evidence.structure.depends_on if case.structured else ()
     if placing.parts:
         names = tuple(dict.fromkeys(part.words for part in placing.parts))
-    return Unexplained(shrink.rms_after_m, case.above_noise, names)
+    return Unexplained(shrink.rms_after_m, case.above_noise or case.wide, names)
 
 
 def refusal(examined: Examined) -> Diagnosis:

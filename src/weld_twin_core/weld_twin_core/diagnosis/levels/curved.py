@@ -14,13 +14,13 @@ from ...recording import Recording
 from ..algebra.fit import fit, robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import NAMING, Shrink, Site
+from ..result import NAMING, Shrink, Site, Structure
 from ..unseen.folds import gain
 from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.decision import Verdict
-from ..verdict.evidence import Scatter
+from ..verdict.decision import Left, Verdict
+from ..verdict.evidence import Evidence, Scatter
 from .free_form import FreeForm, Part, free_form
 
 ROWS = 6000
@@ -159,7 +159,7 @@ def placed(
     result: Search,
     verdict: Verdict,
     alternative: Curved | None,
-    loose: Sequence[Scatter],
+    evidence: Evidence,
     beliefs: Beliefs,
 ) -> FreeForm:
     """
@@ -168,8 +168,8 @@ def placed(
     They explain what is left beside everything that is told.
 
     result: the effects found, before curves take their place.
-    alternative: the free-form explanation beside what is told.
-    loose: joints that noise comes from; places, too, where no group finds any.
+    alternative: the free-form explanation beside what is told. Where there is none, what was found
+    to be left beside the model is a place, and so are joints that noise comes from.
     """
     if verdict.status != 'unknown':
         return FreeForm(())
@@ -179,7 +179,26 @@ def placed(
         form = free_form(result.problem, result.scale, bare, beliefs)
     else:
         form = FreeForm(()) if alternative is None else alternative.form
-    return _with_scatter(form, loose)
+    if not form.parts and Left(evidence, beliefs).structured:
+        form = _of_structure(evidence.structure)
+    return _with_scatter(form, evidence.scattered)
+
+
+def _of_structure(structure: Structure) -> FreeForm:
+    """Return what is left beside the model as one part; whatever nothing takes off may be elsewhere."""
+    shares = structure.of_rest
+    if not shares:
+        return FreeForm(())
+    whole = sum(shares.values()) + 1.0 - max(shares.values())
+    weights = [(_bare(at, on), share / whole) for (at, on), share in shares.items()]
+    first, _ = max(weights, key=lambda item: item[1])
+    part = Part(first, 1.0, tuple(weights), structure.gain)
+    return FreeForm((part,), structure.gain, structure.sure)
+
+
+def _bare(at: str, on: str) -> Group:
+    """Return a place and a dependence that no columns are needed of."""
+    return Group(at, on, (), np.zeros((0, 0)), np.zeros(0))
 
 
 def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
@@ -188,10 +207,7 @@ def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
     more = []
     for one in scattered:
         if one.joint not in seen:
-            rounded, jumping = (
-                Group(one.joint, on, (), np.zeros((0, 0)), np.zeros(0))
-                for on in ('angle', 'direction')
-            )
+            rounded, jumping = (_bare(one.joint, on) for on in ('angle', 'direction'))
             weights = (rounded, ROUNDED), (jumping, JUMPING)
             more.append(Part(rounded, 1.0, weights, one.share))
     if not more:

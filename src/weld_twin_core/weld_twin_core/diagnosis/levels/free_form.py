@@ -56,7 +56,7 @@ class Part:
     def words(self) -> str:
         """Return the group as people read it, or the places where none stands out."""
         places = self.weight_of('at')
-        if max(places.values(), default=1.0) > STANDS_OUT:
+        if len(places) < 2 or max(places.values()) > STANDS_OUT:
             return str(self.group)
         return ' or '.join(list(places)[:NAMED])
 

@@ -154,7 +154,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     bare = Unseen.of(problem, unseen.scale, baseline, np.zeros(0))
     base, first = (each.base(range(len(each.parts))) for each in (unseen, bare))
     before = first.errors(first.residual).sum()
-    found, of_gap = list[tuple[Gain, str]](), dict[tuple[str, str], float]()
+    found, of_gap = list[tuple[Gain, Group]](), dict[tuple[str, str], float]()
     joints = model.robot.joint_names
     # Where no instrument measured, and nothing shows where the base stands, joints alone are told of.
     elsewhere = problem.placed or not problem.untracked
@@ -166,13 +166,15 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
             key = group.at, 'waves' if waves else group.on
             of_gap[key] = max(of_gap.get(key, 0.0), float(1.0 - after / max(before, 1e-300)))
         if _tells(group, at_joint=group.at in joints) and (elsewhere or group.at in joints):
-            found.append((base.gain(group.columns), f'{group.on} at {group.at}'))
+            found.append((base.gain(group.columns), group))
     if not found:
         return Structure(unseen.rms(unseen.whole), 0.0, 0.0, (), of_gap=of_gap)
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    names = [name for one, name in found if one.share > least and one.steady > certain]
+    told = [(one, g) for one, g in found if one.share > least and one.steady > certain][:TOLD]
+    names = tuple(f'{group.on} at {group.at}' for _, group in told)
+    of_rest = {(group.at, group.on): one.share for one, group in reversed(told)}
     chance = 0.0
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
     if counts and may_be_chance(unseen.residual.size, best.share):
@@ -182,7 +184,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
             unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
         )
         chance = chance_gain(tried, beliefs.blatant_sure)
-    return Structure(best.rms_m, best.share, best.steady, tuple(names[:TOLD]), chance, of_gap)
+    return Structure(best.rms_m, best.share, best.steady, names, chance, of_gap, of_rest)
 
 
 def _tells(group: Group, *, at_joint: bool) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -76,6 +77,13 @@ def test_what_cannot_be_added_is_refused_in_a_sentence(diagnosed, url, tmp_path,
     file.write_text(json.dumps(data))
     assert 'diagnose the recording again' in said(old, '--cell', 'a', '--at', '2026-03-02')
     assert not Path(url).exists()
+
+
+def test_without_sqlalchemy_a_sentence_says_how_to_install_it(url, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'sqlalchemy', None)
+    monkeypatch.delitem(sys.modules, 'weld_twin_report.cli.commands.history', raising=False)
+    assert main(['history', 'show', '--db', url]) == 2
+    assert "pip install 'weld-twin[history]'" in capsys.readouterr().err
 
 
 def test_another_robot_is_another_cell(diagnosed, url):

@@ -8,10 +8,10 @@ import json
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
-from sqlalchemy import Connection
 
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.given import Given, pair, refuse_unknown_effect
@@ -23,6 +23,9 @@ from ...history.entry import entry_of, instant
 from ...history.runs import DONE, FAILED, REFUSED, Run
 from ...history.verifications import Verified, put_verified, verifications, verified_of
 from .. import limits, progress
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection  # an extra: the history itself says where it is missing
 
 TROUBLED = 1
 """Exit code where a recording was refused or failed; those that were unsound have their verdict."""

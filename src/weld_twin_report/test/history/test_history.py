@@ -8,7 +8,7 @@ import json
 import shutil
 import sys
 from dataclasses import replace
-from datetime import datetime, timezone
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,13 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.errors import DataError
+from weld_twin_core.twin.directions import GIVE
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_nodes.cli import main
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, entry_of
+from weld_twin_report.history.entry import Entry
+from weld_twin_report.history.words import changed, observations
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -98,6 +101,19 @@ def test_another_robot_is_another_cell(diagnosed, url):
     with pytest.raises(DataError, match="no cell 'b' in the history; it has a"):
         database.entries('b')
     database.close()
+
+
+def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
+    def entry(week, names, value):
+        tool, std = np.eye(4), np.full(len(names), 1e-6)
+        of = ('ur5', '0' * 16, f'week {week}', 'none', 0.9, 1e-4, 3e-5, 1e-4, [])
+        at = MONDAY + timedelta(weeks=week)
+        return Entry(at, *of, names, np.array(value), 1e2 * std, np.diag(std**2), tool)
+
+    zero, give = 'joint_offset elbow_joint 0', f'{GIVE}joint 3'
+    entries = [entry(week, (zero,), (0.0,)) for week in range(3)]
+    entries += [entry(week, (zero, give), (0.0, 5e-5)) for week in range(3, 6)]
+    assert changed(entries, observations(entries)) == ()
 
 
 def test_what_is_no_history_is_refused(tmp_path, capsys):

@@ -15,7 +15,7 @@ from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.history import Change, Observation, changes, outlook, reaches
-from weld_twin_core.twin.directions import CURVE
+from weld_twin_core.twin.directions import CURVE, GIVE
 from weld_twin_nodes.wording.quantities import display_unit, millimetres, odds, uncertain
 from weld_twin_nodes.wording.words import cause
 
@@ -46,9 +46,10 @@ def observations(entries: Sequence[Entry]) -> list[Observation]:
 
 
 def _steady(name: str) -> bool:
-    """Return whether a coordinate is the unevenness of a gear: a curve over its angle, or waves."""
+    """Return whether a coordinate is how a gear was made: a curve over its angle, waves, or its give."""
     effect = REGISTRY.get(name.split(' ')[0])
-    return name.startswith(CURVE) or (effect is not None and effect.traits.waves is not None)
+    waves = effect is not None and effect.traits.waves is not None
+    return waves or name.startswith((CURVE, GIVE))
 
 
 def named(entries: Sequence[Entry]) -> set[str]:

@@ -36,9 +36,8 @@ class Features:
     First-order features of effects, for one recording and one set of stamps.
 
     They are taken where the effects of a twin act, at stamps (M,) [s]. ``remembered`` keeps what
-    effects
-    with memory make of the commanded motion, which no frame and no other effect changes: features
-    of one recording at other models may share it.
+    effects with memory make of the commanded motion, which no frame and no other effect changes:
+    features of one recording at other models may share it.
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class Features:
 
     @cached_property
     def acceleration(self) -> Array:
-        """Return how springs see joints accelerated at the stamps, shape (M, n) [rad/s^2]."""
+        """Return how springs see joints accelerated, shape (M, n) [rad/s^2, or m/s^2 of a slide]."""
         motion, t = self.recording.joints, self.run.view.t
         low, high = (np.clip(t + way, *motion.t[[0, -1]]) for way in (-SLOW, SLOW))
         span = (high - low)[:, None]

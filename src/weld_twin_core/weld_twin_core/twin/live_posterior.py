@@ -20,7 +20,7 @@ MOVED = 0.005
 """Least motion of a joint [rad or m] that is worth another look."""
 LEAD = np.linspace(-0.5, 0.0, 6)
 """Motion at constant speed before the sample [s], so that lag and play are as in the middle of a
-motion."""
+motion. No joint gives, as none is accelerated: a look is held for longer than that lasts."""
 
 
 class LivePosterior:
@@ -50,7 +50,7 @@ class LivePosterior:
         effort: Array | None = None,
     ) -> Expected:
         """
-        Return what `Posterior.expected` does, of one pose, held between two looks.
+        Return what `Posterior.expected` does, of one pose at steady speed, held between two looks.
 
         t: stamp of the joint state [s].
         q: shape (n,).

@@ -140,10 +140,15 @@ def forward(
     """
     Return the fit of a forward selection, and what no machine has and would have explained the rest.
 
+    Several causes together may look like one that no machine has, and so may one that the library
+    lacks. So the search passes it over; where it, or another such, would still explain what is left in
+    the end, all that entered after it stood in for a part of that, and goes.
+
     now: with what the model has already.
     most: stop after this many units.
     tick: told what was found, for progress.
     """
+    doubted: tuple[Fit, list[Effect]] | None = None
     for _ in range(most):
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
@@ -154,23 +159,26 @@ def forward(
             for choice in work.ranked(now, rows, work.beliefs.enter_nats)
             if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
         ]
-        now, entered, impossible = _with_best(work, now, ranked)
+        best, entered, impossible, passed = _with_best(work, now, ranked)
+        if passed and doubted is None:
+            doubted = now, impossible
         if entered is None:
-            return now, impossible
+            return doubted if doubted and passed else (now, impossible)
+        now = best
         tick(entered)
     return now, []
 
 
 def _with_best(
     work: Workspace, now: Fit, ranked: list[Choice]
-) -> tuple[Fit, str | None, list[Effect]]:
+) -> tuple[Fit, str | None, list[Effect], bool]:
     """
     Return the fit with the best choice that a machine can have, its name, and better ones that none has.
 
-    What has no such size imitates a cause that the library lacks. What only has no such shape is
-    another family's, or that of several causes together: that ends no search.
+    The last says whether one of these was passed over that is of no machine's size. What only has no
+    such shape is another family's, or that of several causes together.
     """
-    beliefs, impossible = work.beliefs, list[Effect]()
+    beliefs, impossible, passed = work.beliefs, list[Effect](), False
     while ranked:
         slack = max(beliefs.close_nats, beliefs.close_share * ranked[0].nats)
         close = [c for c in ranked if c.nats > ranked[0].nats - slack][:SHORTLIST]
@@ -187,11 +195,12 @@ def _with_best(
         impossible += absurd
         if possible:
             nats, best, unit = max(possible, key=lambda item: item[0])
-            return best, f'{unit.site} (+{nats:.0f} nats)', impossible
-        if not absurd or not all(_misshapen(now.model.robot, effect) for effect in absurd):
+            return best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed
+        if not absurd:
             break
+        passed |= not all(_misshapen(now.model.robot, effect) for effect in absurd)
         ranked = [choice for choice in ranked if choice not in close]
-    return now, None, impossible
+    return now, None, impossible, passed
 
 
 def _misshapen(robot: Robot, effect: Effect) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from weld_twin_core.diagnosis.calibration.features import TOLD_AS
 
-RISK, CAUSE_RISK = 0.0025, 0.01
+RISK, CAUSE_RISK = 0.003, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 NAMES = {
     'names': 1,

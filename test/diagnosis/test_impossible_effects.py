@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What no machine has: a search passes it over, and takes back what it found where it still explains the rest.
+What no machine has: a search passes it over, and goes back to it where it still explains the rest.
 
 Frames are not put back to where they were given if that takes an effect so large.
 """

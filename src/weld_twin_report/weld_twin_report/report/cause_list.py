@@ -363,9 +363,11 @@ def leftover(diagnosis: Diagnosis) -> Html:
         return tag('p', text)
     text = (
         f'{_with(diagnosis)}{millimetres(rest.rms_m)} remain at a noise floor of {millimetres(floor)}, '
-        'which is more than noise. It depends on:'
+        'which is more than noise. '
     )
-    return joined([tag('p', text), _dependent(rest.structure)])
+    if not rest.structure:
+        return tag('p', f'{text}It depends on nothing that was looked at.')
+    return joined([tag('p', f'{text}It depends on:'), _dependent(rest.structure)])
 
 
 def _with(diagnosis: Diagnosis) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from page_text import page_text
@@ -32,9 +33,10 @@ class Visitor:
 
     def ask(self, path, body=b'', kind='', *, method=None, **headers):
         """Return what is kept of an answer."""
-        return asyncio.run(
-            self._ask(method or ('POST' if kind else 'GET'), path, body, kind, headers)
-        )
+        asked = self._ask(method or ('POST' if kind else 'GET'), path, body, kind, headers)
+        # In a thread of its own: a browser that was driven before leaves its loop to this one.
+        with ThreadPoolExecutor(1) as apart:
+            return apart.submit(asyncio.run, asked).result()
 
     async def _ask(self, method, path, body, kind, headers):
         given = {'host': 'localhost:8765', **self.headers, **headers}

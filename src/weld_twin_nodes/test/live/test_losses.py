@@ -20,10 +20,11 @@ S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
 STEP = 4_000_000
 """Stamps of a controller at 250 Hz [ns]."""
-KEPT = 500
-"""What the queues of this cell keep: two seconds."""
-BURST = 3 * KEPT
-"""Sent while a node stands still: more than its queue and the middleware's (512) keep."""
+KEPT = 200
+"""What the queues of this cell keep: eight tenths of a second."""
+BURST = 5 * KEPT
+"""Sent while a node stands still: more than its queue and the middleware's (512) keep, and within four
+seconds, for who stands still for ten is given up."""
 SOON = 2.7
 """Seconds within which a node ends that waits 2 s for who stands still."""
 TWIN, ANALYZER = 'forward_kinematics_twin', 'deviation_analyzer'

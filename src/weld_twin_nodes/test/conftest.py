@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line in this process, with what it prints."""
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from weld_twin_nodes.cli.in_process import weld_twin as run
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies beside the tests can be imported
 
 
 @pytest.fixture

@@ -299,5 +299,16 @@ SIZES = {name: typical.sizes for name, typical in CAUSES.items()}
 """The parameters of every cause that grow with it."""
 FAMILIES = tuple(name for name, typical in CAUSES.items() if not typical.outside)
 OUTSIDE = tuple(name for name, typical in CAUSES.items() if typical.outside)
+AT_REST = (
+    'joint_offset',
+    'link_length',
+    'link_offset',
+    'link_twist',
+    'gear_ratio',
+    'transmission_ripple',
+    'joint_compliance',
+    'joint_coupling',
+)
+"""Causes that stations at rest show of any arm, and that no frame is one with."""
 MOVING = frozenset(name for name, typical in CAUSES.items() if typical.moving)
 """Causes that stations at rest cannot show."""

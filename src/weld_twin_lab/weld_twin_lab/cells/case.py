@@ -17,23 +17,12 @@ from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
-from ..blind.cause_sizes import Cause, draw, plausible, scaled, site
+from ..blind.cause_sizes import AT_REST, Cause, draw, plausible, scaled, site
 from ..blind.displacement import rms
 from ..plant.camera import Eye, looking, seen
 from ..plant.screws import Motion, compose, exp_screw
 from .drawn import cell, postures, really
 
-FAMILIES = (
-    'joint_offset',
-    'link_length',
-    'link_offset',
-    'link_twist',
-    'gear_ratio',
-    'transmission_ripple',
-    'joint_compliance',
-    'joint_coupling',
-)
-"""Causes that stations at rest show of any arm, and that no frame is one with."""
 SLIDES = ('gear_ratio',)
 """Those that a track has in the plant."""
 STATIONS = 60
@@ -148,7 +137,7 @@ def _cause(
     """Return a cause that moves the tool by a size drawn in noises, and that size."""
     plain = truly([])
     for _ in range(TRIES):
-        family = str(rng.choice(FAMILIES))
+        family = str(rng.choice(AT_REST))
         cause = draw(family, robot, 1.0, rng)
         slides = cause['joint'] in {
             name for name, p in zip(robot.joint_names, robot.prismatic, strict=True) if p

@@ -17,7 +17,7 @@ from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
 from weld_twin_core.motion.inverse.newton import STRETCHED, least_step, reaching
 from weld_twin_core.recording import JointMotion, Recording
 
-from ..blind.cause_sizes import Cause, draw, scaled
+from ..blind.cause_sizes import AT_REST, Cause, draw, scaled
 
 ROUNDS = 4
 """Newton steps in which the plant is made to touch: each leaves a hundredth of what was off."""
@@ -27,18 +27,7 @@ TURN = 2.5
 """Largest angle of a joint [rad] that is started from: further ones wind up cables."""
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
 """Arms of which link masses are known, so that every cause can act."""
-FAMILIES = (
-    'joint_offset',
-    'link_length',
-    'link_offset',
-    'link_twist',
-    'gear_ratio',
-    'transmission_ripple',
-    'joint_compliance',
-    'joint_coupling',
-    'tool_pose',
-    'base_pose',
-)
+FAMILIES = (*AT_REST, 'tool_pose', 'base_pose')
 """Causes drawn; the last one no contact sees."""
 SOCKETS = np.array([[0.5, 0.1, 0.15], [0.1, 0.5, 0.35], [0.35, -0.35, 0.25]])
 """Places [m] within reach of all of them."""

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from recorder_words import heard_of
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
@@ -66,18 +67,6 @@ def recorder(cell, tmp_path, **parameters):
 def listened(cell, topic, count=1):
     cell.wait(lambda: cell.node.count_subscribers(topic) >= count, f'a listener of {topic}')
     cell.meet()
-
-
-def heard_of(cell, recorder_process):
-    """Wait until every node has told of itself to the recorder at least once."""
-    assert recorder_process.code is None
-    own = {cell.node.get_name(), 'recorder'}
-
-    def silent():
-        told = json.loads(cell.trigger('/recorder/counts').message)['told_by']
-        return {f'/{name}' for name in set(cell.node.get_node_names()) - own} - set(told)
-
-    cell.wait(lambda: not silent(), lambda: f'the recorder to hear of {silent()}')
 
 
 def heard_by(cell, speaker):

@@ -98,15 +98,8 @@ def calibrated(
     families = {family.effect: family for family in verdict.families if family.named}
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
-        levels = _levels(k, cause, families, before, form, learned)
-        probabilities = [one.probability for one in levels]
-        reported.append(
-            _of_kind(cause, probabilities, learned)
-            if levels[0].kind == 'place of many'
-            else _of_rest(cause, probabilities, learned)
-            if cause.slot is None
-            else _of_slot(cause, before.table[cause.slot], probabilities, learned)
-        )
+        told, levels = _stated_of(k, cause, families, before, form, learned)
+        reported.append(told)
         said += levels
     kinds = [one for one in said if one.kind == 'name of many']
     slots = [cause for cause in reported if cause.slot is not None]
@@ -128,31 +121,38 @@ def calibrated(
     return verdict, tuple(reported), (*said, *first, *more)
 
 
-def _levels(
+def _stated_of(
     k: int,
     cause: Cause,
     families: Mapping[str, Family],
     before: Stated,
     form: Numbers,
     learned: Calibration,
-) -> list[Statement]:
-    """Return what is said of place and dependence of a cause, and of its name if it has one."""
+) -> tuple[Cause, list[Statement]]:
+    """Return a cause with its probabilities, and what is said of its levels: place, dependence, name."""
     situation, both = before.situation, ('place', 'dependence')
     if cause.slot is not None:
         row, name = before.table[cause.slot], before.names[cause.slot]
         own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
-        return [*levels, replace(name, cause=k)]
+        levels.append(replace(name, cause=k))
+        return _of_slot(cause, row, learned, *_probabilities(levels)), levels
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
         kind = of_kind(cause, family, len(families), before.floor)
         each = (*both, 'name')
-        return [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
+        levels = [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
+        return _of_kind(cause, learned, *_probabilities(levels)), levels
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]
-    return [
+    levels = [
         _told(f'{level} of the rest', k, more, learned)
         for level, more in zip(both, own, strict=True)
     ]
+    return _of_rest(cause, learned, *_probabilities(levels)), levels
+
+
+def _probabilities(levels: Sequence[Statement]) -> list[float]:
+    return [one.probability for one in levels]
 
 
 def _of_answer(
@@ -172,14 +172,15 @@ def _of_answer(
     return out, [complete, answer]
 
 
-def _of_slot(cause: Cause, row: Row, levels: Sequence[float], learned: Calibration) -> Cause:
+def _of_slot(
+    cause: Cause, row: Row, learned: Calibration, place: float, dependence: float, name: float
+) -> Cause:
     """
     Return the cause of an effect found with the probabilities of its place, dependence and name.
 
     What is learned of place and dependence holds where no name of the set is right; where one is,
     each name brings its own along.
     """
-    place, dependence, name = levels
     named = _scaled(cause.name, name)
     own = {one.site: one for one in row.slot}
     places = marginal((own[site].place, p) for site, p in named)
@@ -194,9 +195,10 @@ def _of_slot(cause: Cause, row: Row, levels: Sequence[float], learned: Calibrati
     )
 
 
-def _of_kind(cause: Cause, levels: Sequence[float], learned: Calibration) -> Cause:
+def _of_kind(
+    cause: Cause, learned: Calibration, place: float, dependence: float, name: float
+) -> Cause:
     """Return a kind of many with its probabilities, which its joints and its likes share."""
-    place, dependence, name = levels
     return replace(
         cause,
         place=_scaled(cause.place, place),
@@ -207,9 +209,8 @@ def _of_kind(cause: Cause, levels: Sequence[float], learned: Calibration) -> Cau
     )
 
 
-def _of_rest(cause: Cause, levels: Sequence[float], learned: Calibration) -> Cause:
+def _of_rest(cause: Cause, learned: Calibration, place: float, dependence: float) -> Cause:
     """Return what has no name with the probabilities of its place and dependence."""
-    place, dependence = levels
     reported = place if cause.place else 0.0
     return replace(
         cause,

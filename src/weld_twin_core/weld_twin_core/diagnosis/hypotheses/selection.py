@@ -160,10 +160,10 @@ def forward(
             if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
         ]
         best, entered, impossible, passed = _with_best(work, now, ranked)
-        if passed and doubted is None:
-            doubted = now, impossible
+        if passed:
+            doubted = doubted or (now, impossible)
         if entered is None:
-            return doubted if doubted and passed else (now, impossible)
+            return (passed and doubted) or (now, impossible)
         now = best
         tick(entered)
     return now, []

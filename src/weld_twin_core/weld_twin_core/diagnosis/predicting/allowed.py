@@ -25,7 +25,7 @@ from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverted
-from ..algebra.fit import LEAST_TURN, Fit
+from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.open_directions import VISIBLE, open_directions
@@ -45,9 +45,6 @@ POSTURES = 200
 LEAST = 1e-6
 """Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
 noise would leave no digits for what is open."""
-USUAL_NOISE = 3e-5
-"""What an arm and an instrument leave of a position per axis [m] before anything is known of
-them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 MOST = 3
@@ -177,7 +174,7 @@ def _expected(problem: Problem, scale: Scale) -> float:
     """
     if not problem.at_rest:
         return 1.0
-    return float((USUAL_NOISE / scale.position) ** 2)
+    return float((LEAST_NOISE / scale.position) ** 2)
 
 
 def _joints(recording: Recording) -> Array:

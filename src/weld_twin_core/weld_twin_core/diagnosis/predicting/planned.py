@@ -36,8 +36,8 @@ from ...twin.domain import Domain
 from ...twin.features import Features
 from ...twin.posterior import Posterior, postures_within_limits
 from ...twin.twin import Twin
+from ..algebra.fit import LEAST_NOISE
 from . import plausible_arm
-from .allowed import USUAL_NOISE
 
 SPREAD = np.radians(75.0)
 """Half the range of every joint about the posture of a usual seam [rad]: wide enough to show every
@@ -104,7 +104,7 @@ def plan_stations(
             'column; give a smaller --spread'
         )
     region = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
-    own = min(noise, USUAL_NOISE)
+    own = min(noise, LEAST_NOISE)
     before = _before_any(robot, region[1], own)
     given = Wanted(tolerance, float(np.sqrt(noise**2 - own**2)))
     return _planned(before, Twin(robot), region, count, given)

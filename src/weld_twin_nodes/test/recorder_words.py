@@ -1,0 +1,19 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a recorder has heard of the nodes beside it."""
+
+from __future__ import annotations
+
+import json
+
+
+def heard_of(cell, recorder_process):
+    """Wait until every node has told of itself to the recorder at least once."""
+    assert recorder_process.code is None
+    own = {cell.node.get_name(), 'recorder'}
+
+    def silent():
+        told = json.loads(cell.trigger('/recorder/counts').message)['told_by']
+        return {f'/{name}' for name in set(cell.node.get_node_names()) - own} - set(told)
+
+    cell.wait(lambda: not silent(), lambda: f'the recorder to hear of {silent()}')

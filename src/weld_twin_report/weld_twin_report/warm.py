@@ -129,8 +129,10 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
     except MemoryError:
         reported.last = _TOO_MUCH
     except BaseException as error:
-        short = any(sign in str(error) for sign in _NO_ROOM)
-        reported.last = _TOO_MUCH if short else f'{type(error).__name__}: {error}'
+        reported.last = f'{type(error).__name__}: {error}'
+    # The command tells by itself of a file that it has no room for, in a sentence.
+    if code and any(sign in reported.last for sign in _NO_ROOM):
+        reported.last = _TOO_MUCH
     used = resource.getrusage(resource.RUSAGE_SELF)
     answer(
         out,

@@ -5,17 +5,22 @@
 import numpy as np
 import pytest
 
-from weld_twin_lab.plant.lost_motion import on_joints
-from weld_twin_lab.plant.textbook_effects import Causes, worn
+from weld_twin_lab.plant.flaws import Here, frame, known, on_joints
+from weld_twin_lab.plant.textbook_effects import Causes
 
 JOINTS = ('j0', 'j1')
+
+
+def here(t, q, richness, entry):
+    """Return what a flaw of an arm of two joints sees."""
+    assert entry['effect'] in known()
+    return Here(Causes((entry,), JOINTS), None, t, q, richness, np.random.default_rng(0))
 
 
 def moved(q, rate=1000.0, richness=1.0, **entry):
     """Return the displacement of joint j1 along positions sampled at a rate."""
     q = np.stack([np.zeros(len(q)), q], axis=1)
-    causes = Causes(({'joint': 'j1', **entry},), JOINTS)
-    out = on_joints(causes, np.arange(len(q)) / rate, q, richness)
+    out = on_joints(here(np.arange(len(q)) / rate, q, richness, {'joint': 'j1', **entry}))
     assert not out[:, 0].any()
     return out[:, 1]
 
@@ -60,7 +65,7 @@ def test_a_full_reversal_is_half_undone_after_seven_tenths_of_its_travel():
 
 
 def test_a_tip_wears_at_its_rate_first_and_slower_later():
-    causes = Causes(({'effect': 'wear', 'rate': 1e-5, 'slower': 50.0},), JOINTS)
-    back = worn(causes, np.array([0.0, 1.0, 1e4])).position
+    tip = {'effect': 'wear', 'rate': 1e-5, 'slower': 50.0}
+    back = frame('tool', here(np.array([0.0, 1.0, 1e4]), None, 1.0, tip)).position
     np.testing.assert_allclose(back[:, 2], [0.0, -1e-5, -5e-4], rtol=0.011)
     assert not back[:, :2].any()

@@ -14,7 +14,7 @@ from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import plausible as plausible_of
 
-from ..plant.textbook_effects import LIBRARY
+from ..plant.flaws import known
 
 Cause = dict[str, Any]
 """An entry of an effects file."""
@@ -292,7 +292,7 @@ CAUSES: dict[str, Typical] = {
     'clock_rate': _whole('rate', 2e-5, signed=True, moving=True),
     'link_warm_up': Typical(_warm_up, ('strain',), moving=True),
 }
-NEW = sorted((LIBRARY & set(REGISTRY)) - set(CAUSES) - {'measurement_noise'})
+NEW = sorted((known() & set(REGISTRY)) - set(CAUSES) - {'measurement_noise'})
 """Effects that plant and library have, and that nothing is said of here: as they say themselves."""
 CAUSES |= {name: _usual(REGISTRY[name]) for name in NEW}
 SIZES = {name: typical.sizes for name, typical in CAUSES.items()}

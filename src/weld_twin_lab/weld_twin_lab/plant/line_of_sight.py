@@ -12,9 +12,9 @@ less so the richer the physics.
 
 import numpy as np
 
+from .flaws import Here, flaw
 from .plant_recording import Entry
 from .screws import Motion
-from .textbook_effects import Causes
 
 REFRACTION = 2.256e-4
 """Refractivity over density [m^3/kg]: 2.717e-4 at 1.204 kg/m^3 (emtoolbox.nist.gov, appendix B)."""
@@ -30,12 +30,10 @@ SHOTS = 3
 """Times that the first direction is turned; each miss is a hundred thousandth of the last."""
 
 
-def seen(causes: Causes, pose: Motion, richness: float) -> Motion:
+@flaw('sight')
+def refraction(entry: Entry, here: Here, pose: Motion) -> Motion:
     """Return the pose with its position as the instrument sees it."""
-    position = pose.position
-    for item in causes.of('refraction'):
-        position = _seen(item, position, UNEVEN * richness)
-    return pose._replace(position=position)
+    return pose._replace(position=_seen(entry, pose.position, UNEVEN * here.richness))
 
 
 def _seen(item: Entry, target: np.ndarray, uneven: float) -> np.ndarray:

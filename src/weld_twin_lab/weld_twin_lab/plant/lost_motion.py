@@ -18,7 +18,8 @@ gear_ratio_by_direction
 
 import numpy as np
 
-from .textbook_effects import Causes
+from .flaws import Here, flaw
+from .plant_recording import Entry
 
 PRESLIDING = 3e-4
 """Travel [rad] over which bristles bend."""
@@ -32,30 +33,29 @@ CROSSED = 1.5e-4
 """Half the travel [rad] after which the last of the teeth is on the other flank."""
 ROUND = 4.0
 """Radius [rad] of the curve that the error of a flank follows."""
-HERE = frozenset({'friction', 'hysteresis', 'gear_ratio_by_direction'})
 CONTACTS = 10
 """Tooth contacts; their shares are alike and their travels evenly spread."""
 
 
-def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray, richness: float) -> np.ndarray:
-    """
-    Return the displacement of the links, shape (N, n) [rad or m].
+@flaw('joint')
+def friction(entry: Entry, here: Here) -> np.ndarray:
+    """Return the wind-up of a drive that rubs."""
+    uneven, q = float(entry.get('asymmetry', 0.0)), here.q[:, here.causes.joint(entry['joint'])]
+    return -float(entry['windup']) * _rubbing(here.t, q, uneven, here.richness)
 
-    t: shape (N,) [s].
-    q: motor side, shape (N, n); a sequence in time.
-    """
-    out = np.zeros_like(q)
-    for item in causes.of('friction'):
-        i = causes.joint(item['joint'])
-        uneven = float(item.get('asymmetry', 0.0))
-        out[:, i] -= float(item['windup']) * _rubbing(t, q[:, i], uneven, richness)
-    for item in causes.of('hysteresis'):
-        i = causes.joint(item['joint'])
-        out[:, i] -= float(item['amplitude']) * _contacts(q[:, i], float(item['travel']))
-    for item in causes.of('gear_ratio_by_direction'):
-        i = causes.joint(item['joint'])
-        out[:, i] += 0.5 * float(item['difference']) * _flanks(q[:, i], richness)
-    return out
+
+@flaw('joint')
+def hysteresis(entry: Entry, here: Here) -> np.ndarray:
+    """Return the wind-up of a gear whose teeth let go one after the other."""
+    q = here.q[:, here.causes.joint(entry['joint'])]
+    return -float(entry['amplitude']) * _contacts(q, float(entry['travel']))
+
+
+@flaw('joint')
+def gear_ratio_by_direction(entry: Entry, here: Here) -> np.ndarray:
+    """Return the error of the flank in contact."""
+    q = here.q[:, here.causes.joint(entry['joint'])]
+    return 0.5 * float(entry['difference']) * _flanks(q, here.richness)
 
 
 def _flanks(q: np.ndarray, richness: float) -> np.ndarray:

@@ -20,13 +20,12 @@ Causes beside the textbook: most of them no library knows, and a diagnosis shoul
 Times count from the recording's first stamp.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from . import screws
+from .flaws import Here, flaw
+from .plant_recording import Entry
 from .screws import Motion
-from .textbook_effects import Causes
 
 STUCK_AFTER = 0.3
 """Share of the wind-up that a jump leaves."""
@@ -36,54 +35,38 @@ HIGH_SPOT = 0.1
 """Share of the lean of a bearing that comes twice per turn."""
 FLANK_TORQUE = 0.1
 """Share of the recording's largest load at which the flank is certain, where no torque is given."""
-JOINT_LEVEL = frozenset({'stick_slip', 'friction_wander', 'loaded_play', 'dress_pack'})
-OUTSIDE = JOINT_LEVEL | {
-    'bearing_tilt',
-    'station_step',
-    'tool_slip',
-    'quadratic_scale',
-    'column_bend',
-}
 
 
-def on_joints(
-    causes: Causes,
-    t: np.ndarray,
-    q: np.ndarray,
-    torque: Callable[[], np.ndarray],
-    rng: np.random.Generator,
-) -> np.ndarray:
-    """
-    Return the displacement of the links, shape (N, n) [rad or m].
-
-    t: shape (N,) [s].
-    q: motor side, shape (N, n); a sequence in time.
-    torque: gives the load torque, shape (N, n); asked only where needed.
-    """
-    out = np.zeros_like(q)
-    for item in causes.items:
-        if item['effect'] not in JOINT_LEVEL:
-            continue
-        i = causes.joint(item['joint'])
-        if item['effect'] == 'stick_slip':
-            out[:, i] += _stick_slip(q[:, i], float(item['amplitude']))
-        elif item['effect'] == 'friction_wander':
-            level = _wander(t, float(item['time_constant']), rng)
-            rate = np.gradient(q[:, i], t) if len(t) > 1 else np.zeros(1)
-            out[:, i] += float(item['amplitude']) * level * np.tanh(rate / SLOW)
-        elif item['effect'] == 'loaded_play':
-            load = torque()[:, i]
-            sure = float(item.get('torque') or FLANK_TORQUE * np.abs(load).max()) + 1e-12
-            out[:, i] += 0.5 * float(item['width']) * np.tanh(load / sure)
-        else:
-            middle = float(item.get('middle', np.mean(q[:, i])))
-            reach = float(item.get('reach', np.ptp(q[:, i]) / 2.0)) + 1e-12
-            out[:, i] -= float(item['amplitude']) * ((q[:, i] - middle) / reach) ** 3
-    return out
+@flaw('joint')
+def friction_wander(entry: Entry, here: Here) -> np.ndarray:
+    """Return lost motion of wandering size."""
+    t, q = here.t, here.q[:, here.causes.joint(entry['joint'])]
+    level = _wander(t, float(entry['time_constant']), here.rng)
+    rate = np.gradient(q, t) if len(t) > 1 else np.zeros(1)
+    return np.asarray(float(entry['amplitude']) * level * np.tanh(rate / SLOW))
 
 
-def _stick_slip(q: np.ndarray, amplitude: float) -> np.ndarray:
+@flaw('joint')
+def loaded_play(entry: Entry, here: Here) -> np.ndarray:
+    """Return the flank that the load pulls a gear to."""
+    load = here.torque()[:, here.causes.joint(entry['joint'])]
+    sure = float(entry.get('torque') or FLANK_TORQUE * np.abs(load).max()) + 1e-12
+    return np.asarray(0.5 * float(entry['width']) * np.tanh(load / sure))
+
+
+@flaw('joint')
+def dress_pack(entry: Entry, here: Here) -> np.ndarray:
+    """Return how far a hose pulls the joint back."""
+    q = here.q[:, here.causes.joint(entry['joint'])]
+    middle = float(entry.get('middle', np.mean(q)))
+    reach = float(entry.get('reach', np.ptp(q) / 2.0)) + 1e-12
+    return np.asarray(-float(entry['amplitude']) * ((q - middle) / reach) ** 3)
+
+
+@flaw('joint')
+def stick_slip(entry: Entry, here: Here) -> np.ndarray:
     """Return the lag of a link that sticks until the wind-up jumps it forward."""
+    q, amplitude = here.q[:, here.causes.joint(entry['joint'])], float(entry['amplitude'])
     out, link = np.empty_like(q), q[0]
     for k, motor in enumerate(q):
         if abs(motor - link) > amplitude:
@@ -103,35 +86,45 @@ def _wander(t: np.ndarray, time_constant: float, rng: np.random.Generator) -> np
     return out
 
 
-def wobble(causes: Causes, q: np.ndarray) -> np.ndarray | None:
-    """Return the lean of each axis, shape (M, n) [rad], or None."""
-    lean = np.zeros_like(q)
-    for item in causes.of('bearing_tilt'):
-        i = causes.joint(item['joint'])
-        turned = q[:, i] + float(item.get('phase', 0.0))
-        lean[:, i] += float(item['tilt']) * (np.cos(turned) + HIGH_SPOT * np.cos(2.0 * turned))
-    return lean if lean.any() else None
+@flaw('axis')
+def bearing_tilt(entry: Entry, here: Here) -> np.ndarray:
+    """Return the lean of an axis as its bearing turns."""
+    turned = here.q[:, here.causes.joint(entry['joint'])] + float(entry.get('phase', 0.0))
+    return np.asarray(float(entry['tilt']) * (np.cos(turned) + HIGH_SPOT * np.cos(2.0 * turned)))
 
 
-def frame_error(causes: Causes, effect: str, t: np.ndarray) -> Motion:
-    """Return the sum over entries of a displaced frame, switched or warmed in over (M,) times."""
-    xyz, rotvec = np.zeros((2, len(t), 3))
-    for item in causes.of(effect):
-        if 'time' in item:
-            share = (t >= float(item['time'])).astype(float)
-        else:
-            share = 1.0 - np.exp(-t / float(item['time_constant']))
-        xyz += share[:, None] * np.asarray(item.get('xyz', (0.0, 0.0, 0.0)), dtype=float)
-        rotvec += share[:, None] * np.asarray(item.get('rotvec', (0.0, 0.0, 0.0)), dtype=float)
-    return screws.from_rotvec(rotvec, xyz)
+def _come(entry: Entry, t: np.ndarray) -> np.ndarray:
+    """Return a displaced frame, switched or warmed in over (M,) times, shape (M, 6)."""
+    if 'time' in entry:
+        share = (t >= float(entry['time'])).astype(float)
+    else:
+        share = 1.0 - np.exp(-t / float(entry['time_constant']))
+    off = [*entry.get('xyz', (0.0, 0.0, 0.0)), *entry.get('rotvec', (0.0, 0.0, 0.0))]
+    return np.asarray(share[:, None] * np.asarray(off, dtype=float))
 
 
-def on_instrument(causes: Causes, pose: Motion, t: np.ndarray) -> Motion:
-    """Return the pose as a knocked and distorting instrument has it."""
-    pose = screws.compose(frame_error(causes, 'station_step', t), pose)
-    position = pose.position
-    for item in causes.of('quadratic_scale'):
-        arm = pose.position - np.asarray(item.get('origin', (0.0, 0.0, 0.0)), dtype=float)
-        far = np.linalg.norm(arm, axis=-1, keepdims=True)
-        position = position + float(item['coefficient']) * far * arm
-    return pose._replace(position=position)
+@flaw('base')
+def column_bend(entry: Entry, here: Here) -> np.ndarray:
+    """Return how the base leans over as the column warms up."""
+    return _come(entry, here.t)
+
+
+@flaw('tool')
+def tool_slip(entry: Entry, here: Here) -> np.ndarray:
+    """Return how the tool slips in its holder."""
+    return _come(entry, here.t)
+
+
+@flaw('stand')
+def station_step(entry: Entry, here: Here, pose: Motion) -> Motion:
+    """Return the pose in a measuring frame that was knocked."""
+    off = _come(entry, here.t)
+    return screws.compose(screws.from_rotvec(off[:, 3:], off[:, :3]), pose)
+
+
+@flaw('sight')
+def quadratic_scale(entry: Entry, here: Here, pose: Motion) -> Motion:
+    """Return the pose stretched with its own length."""
+    arm = pose.position - np.asarray(entry.get('origin', (0.0, 0.0, 0.0)), dtype=float)
+    far = np.linalg.norm(arm, axis=-1, keepdims=True)
+    return pose._replace(position=pose.position + float(entry['coefficient']) * far * arm)

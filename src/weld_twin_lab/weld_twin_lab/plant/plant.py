@@ -11,34 +11,25 @@ instrument and clocks (`tracker`). Nothing here is shared with the twin that is 
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import (
-    drives,
-    exponentials,
-    hose,
-    line_of_sight,
-    lost_motion,
-    outside_causes,
-    rollout,
-    screws,
-    tree,
-)
+from . import drives, exponentials, flaws, hose, rollout, screws, tree
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant
 from .exponentials import Arm
+from .flaws import Here
 from .pedestal import Pedestal
 from .plant_recording import Command, Course, Entry, PlantRecording
 from .screws import Motion
 from .textbook_effects import Causes
 from .tracker import Tracker
 
-KNOWN = library.LIBRARY | outside_causes.OUTSIDE
+KNOWN = flaws.known()
 KEPT = 4
 """Cells kept with what was simulated of them: a study records one motion with the same flaws several
 times, once for each instrument, and MuJoCo would say the same each time."""
@@ -126,6 +117,10 @@ class _Cell:
     def _seen(self) -> dict[tuple[bytes, str], tuple[Motion, Any]]:
         return {}
 
+    def here(self, t: np.ndarray, q: np.ndarray, rng: np.random.Generator, **more: Any) -> Here:
+        """Return what a flaw sees at true times (M,) [s] and motor positions (M, n)."""
+        return Here(self.causes, self.arm, t - self.start, q, self.richness, rng, **more)
+
     def leaned(self, t: np.ndarray) -> Motion:
         """Return how the base has turned at true times (M,) [s], in its own frame."""
         if self.pedestal.stiff:
@@ -151,7 +146,7 @@ def run(
     Move a robot with flaws and record it.
 
     robot: a robot file, as docs/conventions.md has it.
-    effects: the flaws, as in an effects file; also those of `outside_causes`.
+    effects: the flaws, as in an effects file; also those that no library knows.
     rng: source of everything random; the same seed gives the same recording.
     richness: how far the physics of servo, gap, spring and flywheel goes beyond the textbook form
     of the effect: 0 is the textbook, 1 a plausible machine.
@@ -220,17 +215,17 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     q, motor = _link_side(cell, t, rng)
     causes, arm, since = cell.causes, cell.arm, t - cell.start
     rows = library.rows_as_built(causes, arm, since, cell.course.temperature(t))
-    lean = outside_causes.wobble(causes, motor)
     base, tool = library.frames(causes, arm)
-    base = screws.compose(base, outside_causes.frame_error(causes, 'column_bend', since))
-    base = screws.compose(base, cell.leaned(t))
-    tool = screws.compose(tool, outside_causes.frame_error(causes, 'tool_slip', since))
-    tool = screws.compose(tool, library.worn(causes, since))
-    flange = exponentials.flange(arm, exponentials.home(arm, rows), q, lean)
+    here = cell.here(t, motor, rng, wrench=cell.course.wrench(t))
+    lean = flaws.on_joints(here, 'axis')
+    base = screws.compose(base, flaws.frame('base', here), cell.leaned(t))
+    tool = screws.compose(tool, flaws.frame('tool', here))
+    flange = exponentials.flange(
+        arm, exponentials.home(arm, rows), q, lean if lean.any() else None
+    )
     pose = screws.compose(base, flange, tool)
-    pose = library.yielding(causes, pose, cell.course.wrench(t))
-    pose = outside_causes.on_instrument(causes, pose, since)
-    return library.measured(causes, line_of_sight.seen(causes, pose, cell.richness), since)
+    pose = library.yielding(causes, pose, here.wrench)
+    return library.measured(causes, flaws.seen(here, pose, 'hand', 'stand', 'sight'), since)
 
 
 def _link_side(
@@ -254,22 +249,17 @@ def _at_rest(cell: _Cell, rng: np.random.Generator) -> np.ndarray:
     q = command.q + library.gearing(cell.causes, command.q)
     wrench = cell.with_hoses(q, command.wrench)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, wrench)
-    flaws = outside_causes.on_joints(
-        cell.causes, command.t, q, lambda: compliant.torque(q, wrench), rng
-    )
-    flaws += lost_motion.on_joints(cell.causes, command.t, q, cell.richness)
-    return np.asarray(give + flaws)
+    torque = partial(compliant.torque, q, wrench)
+    return np.asarray(give + flaws.on_joints(cell.here(command.t, q, rng, torque=torque)))
 
 
 def _in_motion(
     cell: _Cell, rng: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray | float]:
     """Return what gives as a function of time."""
-    flaws = outside_causes.JOINT_LEVEL | lost_motion.HERE
-    flawed = any(item['effect'] in flaws for item in cell.causes.items)
-    if cell.compliant.rigid and not flawed:
+    if cell.compliant.rigid and not flaws.any_on_joints(cell.causes):
         return lambda _: 0.0
-    give = outside_causes.on_joints(cell.causes, cell.grid, cell.geared, lambda: cell.torque, rng)
-    give = give + lost_motion.on_joints(cell.causes, cell.grid, cell.geared, cell.richness)
-    spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(cell.grid, give + cell.sprung)
+    here = cell.here(cell.grid, cell.geared, rng, torque=lambda: cell.torque)
+    give = flaws.on_joints(here) + cell.sprung
+    spline: Callable[[np.ndarray], np.ndarray] = CubicSpline(cell.grid, give)
     return spline

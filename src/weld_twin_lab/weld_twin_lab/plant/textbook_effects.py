@@ -3,11 +3,9 @@
 """
 Effects that have a closed form: geometry as built, gearing, frames, the instrument.
 
-The names and parameters are those of docs/effects.md. Effects that need physics are in
-`drives` (servo_lag, vibration) and in `tree` and `compliance` (backlash, joint_compliance,
-payload), in `lost_motion` (friction, hysteresis, gear_ratio_by_direction), in `pedestal`, `hose` and
-`line_of_sight` (pedestal_tilt, hose_pull, refraction); causes that no library knows are in
-`outside_causes`.
+The names and parameters are those of docs/effects.md. Effects that need masses and springs are in
+`drives` (servo_lag, vibration), in `tree` and `compliance` (backlash, joint_compliance, payload), in
+`pedestal` and `hose`. Each of the others is a function of its own, see `flaws`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -50,13 +48,8 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
     'quantization',
     'measurement_scale',
     'measurement_noise',
-    'friction',
-    'hysteresis',
-    'gear_ratio_by_direction',
-    'wear',
     'pedestal_tilt',
     'hose_pull',
-    'refraction',
 }
 
 
@@ -198,20 +191,6 @@ def frames(causes: Causes, arm: Arm) -> tuple[Motion, Motion]:
         Motion(base.rotation @ arm.base.rotation, arm.base.position + base.position),
         Motion(arm.tool.rotation @ tool.rotation, arm.tool.position + tool.position),
     )
-
-
-def worn(causes: Causes, t: np.ndarray) -> Motion:
-    """
-    Return the tool's tip as wear has drawn it back along its z, in the tool frame, (len(t),).
-
-    A tip wears fast while it is sharp: the rate is that of the first second, and falls off with
-    the time constant `slower` [s].
-    """
-    back = np.zeros((len(t), 3))
-    for item in causes.of('wear'):
-        slower = float(item.get('slower', 1e6))
-        back[:, 2] += float(item['rate']) * slower * np.expm1(-t / slower)
-    return screws.from_rotvec(np.zeros(3), back)
 
 
 def yielding(causes: Causes, pose: Motion, wrench: np.ndarray | None) -> Motion:

@@ -51,7 +51,7 @@ TESTS = {
     'atoms noise_and_interval learned_priors many_small_errors springs_at_rest evidence '
     'normal_equations definite impossible_effects steps_by_hand',
     'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '
-    'learned_sizes stray_readings folds',
+    'stray_readings folds',
     'src/weld_twin_core/test/soundness': 'alignment checks_by_hand kept_findings mends mixups_by_hand '
     'soundness trials',
     'src/weld_twin_core/test/advice': 'next_experiment pieces_by_hand',

@@ -6,8 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
+from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, recorded, sites, tiny
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
@@ -185,3 +187,15 @@ def test_families_are_no_explanation_while_structure_remains(families, gain, sta
     verdict = judged(families, gain, 9.0 if gain else 0.0)
     assert verdict.status == status
     assert {site.effect for group in verdict.sets for site in group} == {'link_length'}
+
+
+def test_a_fine_ripple_that_two_short_recordings_tell_together_is_named():
+    # 24 stations over four radians tell waves up to 18 to a turn, twice as many up to 36.
+    robot = load('ur5')
+    ripple = {'effect': 'transmission_ripple', 'joint': 'elbow_joint'}
+    ripple |= {'amplitude': 4e-4, 'order': 29, 'phase': 0.7}
+    runs = [recorded(robot, [ripple], seed, static=24, name=f'run {seed}') for seed in (3, 4)]
+    found = diagnose(runs, robot, experiment=False)
+    assert sites(found) == [{('transmission_ripple', 'elbow_joint')}]
+    assert found.effects[0].effect.order == 29
+    assert found.status == 'identified'

@@ -1,19 +1,24 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Sobol and Morris against functions whose indices are known on paper."""
+"""Sobol and Morris against functions whose indices are known on paper, and against SALib."""
+
+from __future__ import annotations
 
 from importlib.metadata import version
 
 import numpy as np
 import pytest
 from SALib.analyze import morris as salib_screening
+from SALib.analyze import sobol as salib_analyze
 from SALib.sample import morris as salib_ways
 from SALib.sample import sobol
+from SALib.sample import sobol as salib_sample
 from SALib.util import compute_groups_matrix
 from scipy.stats import norm
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import MorrisDesign, SobolDesign, morris_screening, sobol_indices
+from weld_twin_core.sensitivity.sobol import base_pair, mixed, sobol_estimates, sobol_half_widths
 
 
 def ishigami(unit):
@@ -162,3 +167,22 @@ def test_morris_of_a_linear_model_is_its_slope_without_scatter():
     found = morris_screening(lambda u: u @ weights, 'abc', 10)
     np.testing.assert_allclose(found.mu_star, np.abs(weights) * 0.96, rtol=1e-9)
     np.testing.assert_allclose(found.sigma, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize('groups', [None, list('ghgfh')])
+def test_design_indices_and_intervals_are_those_of_salib(groups: list[str] | None) -> None:
+    problem = {'num_vars': 5, 'names': list('abcde'), 'bounds': [[0.0, 1.0]] * 5}
+    if groups:
+        problem['groups'] = groups
+    theirs = salib_sample.sample(problem, 64, calc_second_order=False, seed=7)
+    ours = mixed(*base_pair(5, 64, 7), groups)
+    assert np.abs(ours.reshape(theirs.shape) - theirs).max() == 0.0
+    runs = theirs @ np.arange(5.0) + 3.0 * theirs[:, 0] * theirs[:, 4] ** 2
+    found = salib_analyze.analyze(problem, runs, calc_second_order=False, seed=7)
+    results = runs.reshape(64, -1)
+    first, total = sobol_estimates(results)
+    first_half, total_half = sobol_half_widths(results, 0.95, np.random.default_rng(7))
+    assert np.abs(first - found['S1']).max() < 1e-12
+    assert np.abs(total - found['ST']).max() < 1e-12
+    assert np.abs(first_half - found['S1_conf']).max() < 1e-12
+    assert np.abs(total_half - found['ST_conf']).max() < 1e-12

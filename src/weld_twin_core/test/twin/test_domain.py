@@ -1,14 +1,21 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What was recorded, and how a motion outside of it is told."""
+"""What was recorded, how a motion outside of it is told, and how little is corrected there."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+import weld_twin_core as wt
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.contacts import Artefact, Contact, Contacts
+from weld_twin_core.effects import REGISTRY
+from weld_twin_core.motion.inverse.newton import reaching
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core.twin.compensation import compensate
 from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.twin import Twin
 
 UR5 = load('ur5')
 
@@ -100,3 +107,85 @@ def test_motion_after_stations_at_rest_is_told():
         'only stations at rest' in domain.outside(moving.joints.q, moving.joints.velocity)[0].why
     )
     assert domain.outside(moving.joints.q) == []
+
+
+DOMAIN = Domain(UR5.joint_names, tuple(((-1.0, 1.0),) for _ in range(6)), (0.02,) * 6, (True,) * 6)
+
+
+def test_all_where_it_was_recorded_and_the_best_share_far_outside():
+    q = np.zeros((3, 6))
+    q[:, 2] = [1.0, 1.05, 2.0]
+    correction = np.tile([3e-4, 0.0, 4e-4], (3, 1))  # half a millimetre
+    covariance = np.tile(np.diag([4e-8, 2e-8, 2.5e-9]) * 4.0, (3, 1, 1))  # root of trace 0.5 mm
+    share = DOMAIN.trust(q, correction, covariance)
+    assert share[0] == 1.0
+    assert 0.5 < share[1] < 1.0
+    assert abs(share[2] - 0.5) < 1e-9
+
+
+def test_the_share_goes_over_without_a_jump():
+    q = np.zeros((2001, 6))
+    q[:, 4] = np.linspace(0.9, 1.3, 2001)
+    still = np.tile([1e-4, 0.0, 0.0], (2001, 1))
+    share = DOMAIN.trust(q, still, np.tile(np.eye(3) * 1e-6, (2001, 1, 1)))
+    assert np.abs(np.diff(share)).max() < 5e-3
+    assert share[-1] < 0.01
+
+
+def test_commands_take_off_their_share_and_no_more():
+    effects = (REGISTRY['joint_offset']('elbow_joint', 2e-3),)
+    q = np.tile([0.1, -1.2, 1.5, -1.8, -1.5, 0.3], (3, 1))
+    recording = Recording('m', JointMotion(np.arange(3.0), q, None, True))
+    result = compensate(UR5, effects, recording, trust=np.array([1.0, 0.25, 0.0]))
+    nominal = Twin(UR5).poses(recording).position
+    real = Twin(UR5, effects).poses(Recording('c', result.motion)).position
+    off = np.linalg.norm(real - nominal, axis=1)
+    whole = np.linalg.norm(Twin(UR5, effects).poses(recording).position - nominal, axis=1)
+    assert whole.min() > 5e-4
+    np.testing.assert_allclose(off / whole, [0.0, 0.75, 1.0], atol=1e-6)
+
+
+ELBOW_UP = np.array([0.2, -1.0, 1.4, -1.9, -1.5, 0.0])
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return wt.load('ur5')
+
+
+def touched(robot, at):
+    """Return one posture that touches a pin somewhere."""
+    start = ELBOW_UP + np.random.default_rng(1).normal(0.0, 0.3, (40, 6))
+    found, good = reaching(robot, np.tile(at, (40, 1)), start)
+    q = found[good][:1]
+    contacts = Contacts(Artefact((Contact('pin'),)), ('pin',))
+    return wt.Recording('pin', wt.JointMotion([0.0], q, static=True), contacts=contacts)
+
+
+def reasons(robot, places, at):
+    """Return why a posture at a point lies outside, as far as places are the reason."""
+    domain = Domain.of([touched(robot, place) for place in places], robot)
+    found = domain.outside(touched(robot, at).joints.q)
+    return [item.why for item in found if 'place that was touched' in item.why]
+
+
+def test_beside_a_single_place_the_model_is_believed_and_far_from_it_not(robot):
+    assert reasons(robot, [[0.5, 0.1, 0.3]], [0.5, 0.15, 0.3]) == []
+    (why,) = reasons(robot, [[0.5, 0.1, 0.3]], [0.5, 0.4, 0.3])
+    assert why == (
+        'the tool is 0.3 m from the nearest place that was touched, and the model was tested to '
+        '0.1 m'
+    )
+
+
+def test_three_places_vouch_as_far_as_from_each_to_the_next(robot):
+    places = [[0.5, 0.1, 0.3], [0.5, -0.1, 0.3], [0.5, 0.1, 0.55]]
+    assert reasons(robot, places, [0.5, -0.3, 0.3]) == []
+    (why,) = reasons(robot, places, [0.5, -0.4, 0.3])
+    assert why.endswith('the model was tested to 0.25 m')
+
+
+def test_what_an_instrument_measured_knows_no_places(robot):
+    q = ELBOW_UP[None] + np.linspace(0.0, 0.5, 9)[:, None]
+    motion = wt.JointMotion(np.arange(9.0), q, static=True)
+    assert Domain.of([wt.Recording('tracker', motion)], robot).spots is None

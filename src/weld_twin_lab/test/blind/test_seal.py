@@ -51,27 +51,18 @@ def change(path):
     path.write_bytes(data)
 
 
-def test_one_changed_byte_of_a_recording_is_found(sealed):
-    change(sealed[0] / 'case_0002' / 'train' / 'train.mcap')
-    with pytest.raises(DataError, match='case of case_0002 was changed'):
-        seal.opened(*sealed)
-
-
-def test_one_changed_byte_of_a_truth_is_found(sealed):
-    change(sealed[1] / 'case_0001' / layout.TRUTH)
-    with pytest.raises(DataError, match='truth of case_0001 was changed'):
-        seal.opened(*sealed)
-
-
-def test_a_file_added_to_a_case_is_found(sealed):
-    (sealed[0] / 'case_0001' / 'more').write_text('')
-    with pytest.raises(DataError, match='case_0001 was changed'):
-        seal.opened(*sealed)
-
-
-def test_a_truth_taken_away_is_found(sealed):
-    (sealed[1] / 'case_0002').rename(sealed[1] / 'lost')
-    with pytest.raises(DataError, match='truth of case_0002 is missing'):
+@pytest.mark.parametrize(
+    ('spoil', 'words'),
+    [
+        (lambda c, t: change(c / 'case_0002/train/train.mcap'), 'case of case_0002 was changed'),
+        (lambda c, t: change(t / 'case_0001' / layout.TRUTH), 'truth of case_0001 was changed'),
+        (lambda c, t: (c / 'case_0001/more').write_text(''), 'case_0001 was changed'),
+        (lambda c, t: (t / 'case_0002').rename(t / 'lost'), 'truth of case_0002 is missing'),
+    ],
+)
+def test_one_changed_byte_a_file_added_and_a_truth_taken_away_are_found(sealed, spoil, words):
+    spoil(*sealed)
+    with pytest.raises(DataError, match=words):
         seal.opened(*sealed)
 
 

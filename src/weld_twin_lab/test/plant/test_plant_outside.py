@@ -74,25 +74,18 @@ def test_loaded_play_follows_the_load():
     assert moved[sure] == pytest.approx(5e-4 * np.sign(load[sure]), rel=0.01)
 
 
-def test_what_friction_holds_is_the_same_in_every_recording_where_it_is_given():
+@pytest.mark.parametrize(
+    ('effect', 'joint', 'known'),
+    [('loaded_play', 'j1', {'torque': 5.0}), ('dress_pack', 'j2', {'middle': 0.1, 'reach': 1.5})],
+)
+def test_what_is_given_is_the_same_in_every_recording(effect, joint, known):
+    """What friction holds, and where a hose hangs."""
     whole = stations(UR5, 15)
     part = replace(whole, t=whole.t[:4], q=whole.q[:4])
-    gear = {'effect': 'loaded_play', **CASES['loaded_play']}
-    for given, alike in (({'torque': 5.0}, True), ({}, False)):
+    cause = {'effect': effect, **CASES[effect], 'joint': joint}
+    for given, alike in ((known, True), ({}, False)):
         first, again = (
-            joint_displacement(UR5, [{**gear, **given}], command, 'j1')
-            for command in (whole, part)
-        )
-        assert np.allclose(first[:4], again, atol=1e-9) is alike
-
-
-def test_where_a_hose_hangs_is_the_same_in_every_recording_where_it_is_given():
-    whole = stations(UR5, 15)
-    part = replace(whole, t=whole.t[:4], q=whole.q[:4])
-    hose = {'effect': 'dress_pack', **CASES['dress_pack'], 'joint': 'j2'}
-    for given, alike in (({'middle': 0.1, 'reach': 1.5}, True), ({}, False)):
-        first, again = (
-            joint_displacement(UR5, [{**hose, **given}], command, 'j2')
+            joint_displacement(UR5, [{**cause, **given}], command, joint)
             for command in (whole, part)
         )
         assert np.allclose(first[:4], again, atol=1e-9) is alike

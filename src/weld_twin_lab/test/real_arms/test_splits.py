@@ -1,16 +1,23 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The splits are what they say, and nothing is judged on what it was fitted on."""
+"""Splits are what they say, nothing is judged on what it was fitted on; published data are read."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_lab.coverage.touched import postures_at
 from weld_twin_lab.real_arms.goals import measures
-from weld_twin_lab.real_arms.poor import paired
+from weld_twin_lab.real_arms.poor import paired, plain_axis
+from weld_twin_lab.real_arms.sources import places_of, servo, socket_robot, touches
 from weld_twin_lab.real_arms.splits import LEAST, among, halves, kept_back, splits
+from weld_twin_lab.real_arms.unseen import traceback_text
 
 
 @pytest.fixture(scope='module')
@@ -144,3 +151,80 @@ def test_a_first_fifth_with_nothing_of_the_rest_among_it_is_judged_outside_alone
     (split,) = [s for s in splits('ur5', moved) if s.kind == 'first_fifth']
     assert split.inside is None
     assert split.outside.measured.t.size == 720
+
+
+PLACES = {'front': [0.5, 0.0, 0.2], 'left': [0.0, 0.5, 0.4]}
+EACH = 6
+
+
+@pytest.fixture(scope='module')
+def data(tmp_path_factory):
+    """Return a directory with touches of an exact arm, sockets 50 mm apart."""
+    folder, rng = tmp_path_factory.mktemp('data'), np.random.default_rng(2)
+    robot = socket_robot(folder, 'kuka_14')
+    for place, point in PLACES.items():
+        (folder / 'kuka_14' / place).mkdir(parents=True)
+        for socket in (0, 1):
+            target = np.array(point) + [0.0, 0.05 * socket, 0.0]
+            q = postures_at(robot, target, EACH, rng)
+            np.savetxt(folder / 'kuka_14' / place / f'hole_{socket}.csv', q, delimiter=',')
+    return folder
+
+
+def test_touches_of_an_exact_arm_do_not_scatter(data):
+    assert places_of(data, 'kuka_14') == ('front', 'left')
+    recording = touches(data, 'kuka_14', ['left'])
+    assert recording.contacts.labels == ('left/0',) * EACH + ('left/1',) * EACH
+    _, model = aligned(recording, socket_robot(data, 'kuka_14'), '', ())
+    points = model.twin(0).poses(recording, recording.joints.t).position.reshape(2, EACH, 3)
+    assert np.ptp(points, axis=1).max() < 1e-8
+    assert np.linalg.norm(points[0, 0] - points[1, 0]) == pytest.approx(0.05, abs=1e-8)
+
+
+def test_files_of_a_traceback_are_told_as_from_their_package_on():
+    try:
+        wt.load('no robot of this name')
+    except Exception:
+        told = traceback_text()
+    assert (
+        'File "weld_twin_core/weld_twin_core/arm/' in told or 'File "weld_twin_core/arm/' in told
+    )
+    assert str(wt.__file__).rpartition('/weld_twin_core/')[0] not in told
+
+
+FILE = 'DATA_EMPS.mat'
+LAG = 6.5e-3
+
+
+@pytest.fixture
+def published(tmp_path):
+    """Return a directory with an axis that lags, and sticks a little as it turns."""
+    t = np.arange(0.0, 6.0, 1e-3)[:, None]
+    reference = 0.1 * np.sin(1.3 * t)
+    speed = 0.13 * np.cos(1.3 * t)
+    measured = reference - LAG * speed - 5e-6 * np.sign(speed)
+    (tmp_path / 'emps').mkdir()
+    savemat(tmp_path / 'emps' / FILE, {'t': t, 'qg': reference, 'qm': measured})
+    return tmp_path
+
+
+def test_plain_models_leave_less_the_more_they_know(published):
+    left = plain_axis(servo(published).recording, 3600)
+    assert left['as given'] > 50.0 * left['lag'] > 50.0 * left['lag and sign']
+    # A square wave without its fundamental, which the lag takes: sqrt(1 - 8 / pi^2) is left.
+    assert left['lag'] == pytest.approx(5e-6 * np.sqrt(1.0 - 8.0 / np.pi**2), rel=0.1)
+
+
+def test_across_the_axis_everything_is_zero(published):
+    recording = servo(published).recording
+    assert not recording.measured.position[:, :2].any()
+    assert recording.joints.q.shape == (6000, 1)
+
+
+@pytest.mark.parametrize('content', [None, {'x': [1.0]}])
+def test_another_file_is_said_to_be_another(tmp_path, content):
+    (tmp_path / 'emps').mkdir()
+    if content:
+        savemat(tmp_path / 'emps' / FILE, content)
+    with pytest.raises(DataError, match=FILE):
+        servo(tmp_path)

@@ -4,18 +4,14 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.calibration.weights import FILE
-from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.judging import NOT_IN_LIBRARY
@@ -28,10 +24,8 @@ from .logistic import log_loss
 from .mix import USUAL
 from .oracle import certainty
 from .rows import seeds_of
-from .table import page
 from .trial import tried
 
-RESULT, PAGE = 'results.json', 'belief.md'
 COVERAGE = 0.7
 """Share of the statements, the surest first, at which the risk is quoted."""
 MIX = (
@@ -154,29 +148,3 @@ def _risk_at(reported: Array, right: NDArray[np.bool_]) -> float:
 def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
     own = {key: row[key] for key in ('name', 'kind', 'robot', 'motion', 'truth', 'sizes')}
     return {**own, 'said': f'{row["status"]} {row["said"]}'.strip()}
-
-
-def write(
-    out: Path,
-    content: Mapping[str, Any],
-    rows: Sequence[Mapping[str, Any]],
-    taught: Sequence[Mapping[str, Any]] = (),
-) -> str:
-    """
-    Write the file of weights, what it is worth, and the page; return the page.
-
-    content: of the file of weights.
-    rows: cases that it did not learn from; where there are none, those learned from are judged by
-    weights that had not seen them.
-    taught: cases that it learned from.
-    """
-    examples = examples_of(rows) if rows else learning.unseen(examples_of(taught), content)
-    result = judged(content, rows, examples)
-    text = page(result)
-    for name, body in (
-        (FILE, json.dumps(content, indent=1) + '\n'),
-        (RESULT, json.dumps(result, indent=1) + '\n'),
-        (PAGE, text),
-    ):
-        write_owned(out / name, body)
-    return text

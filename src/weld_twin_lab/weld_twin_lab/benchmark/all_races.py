@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
+from weld_twin_msgs_py.files.whole_files import write_json
 
 from . import race_table
 from .arms import calibrated_arm
@@ -63,8 +63,7 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
         'left_out': missing,
         'workloads': [outcome.as_dict() for outcome in outcomes],
     }
-    text = json.dumps(results, indent=1) + '\n'
-    (folder / 'benchmark.json').write_text(text, encoding='utf-8')
+    write_json(folder / 'benchmark.json', results)
 
 
 def _workloads(effort: Effort, peers: dict[str, Peer]) -> Iterator[Workload]:

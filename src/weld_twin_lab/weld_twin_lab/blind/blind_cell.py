@@ -210,6 +210,15 @@ def record(
     )
 
 
+def at_stations(
+    robot: Robot, causes: Sequence[Cause], q: Array, tracker: Tracker, rng: np.random.Generator
+) -> Measurements:
+    """Return where the plant's instrument sees the tool of an arm with causes at stations, (M, n)."""
+    command = Command(1.0 + np.arange(float(len(q))), q, static=True)
+    seen = run(robot.to_mapping(), list(causes), command, tracker, rng)
+    return Measurements(command.t, seen.position)
+
+
 def exact(tracker: Tracker) -> Tracker:
     """Return the instruments without their errors, sampling at the same instants."""
     return replace(

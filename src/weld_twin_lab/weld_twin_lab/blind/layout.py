@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import read_json, write_json
 
 CASES = 'cases.json'
 CASE = 'case.json'
@@ -38,24 +37,12 @@ def read(path: Path) -> dict[str, Any]:
 
     Raises DataError: it cannot be read or is something else.
     """
-    try:
-        data = json.loads(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise DataError(f"'{path}' cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise DataError(f"'{path}' is not JSON: {error}") from None
-    wanted = SCHEMAS[path.name]
-    schema = data.get('schema') if isinstance(data, dict) else None
-    if schema != wanted:
-        raise DataError(f"'{path}' has the schema {schema!r}, expected {wanted}")
-    return dict(data)
-
-
-def text(name: str, content: dict[str, Any]) -> str:
-    """Return the text of one of the JSON files above."""
-    return json.dumps({'schema': SCHEMAS[name], **content}, indent=1) + '\n'
+    data, wanted = read_json(path), SCHEMAS[path.name]
+    if data.get('schema') != wanted:
+        raise DataError(f"'{path}' has the schema {data.get('schema')!r}, expected {wanted}")
+    return data
 
 
 def write(path: Path, content: dict[str, Any], *, overwrite: bool = False) -> None:
     """Write one of the JSON files above."""
-    write_text(path, text(path.name, content), overwrite=overwrite)
+    write_json(path, {'schema': SCHEMAS[path.name], **content}, overwrite=overwrite)

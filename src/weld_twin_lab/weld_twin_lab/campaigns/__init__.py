@@ -21,13 +21,14 @@ import json
 import os
 import platform
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import read_json, write_text
 
 SCHEMA = 'weld_twin/campaign/1'
 
@@ -70,10 +71,8 @@ def refuse_foreign(path: Path | str, campaign: str) -> None:
     target = Path(path)
     if not target.exists():
         return
-    try:
-        content = json.loads(target.read_text(encoding='utf-8'))
-        ours = (content['schema'], content['campaign']) == (SCHEMA, campaign)
-    except (OSError, ValueError, LookupError, TypeError):
-        ours = False
-    if not ours:
-        raise DataError(f"'{target}' holds something else already; choose another file")
+    with suppress(DataError):
+        content = read_json(target)
+        if (content.get('schema'), content.get('campaign')) == (SCHEMA, campaign):
+            return
+    raise DataError(f"'{target}' holds something else already; choose another file")

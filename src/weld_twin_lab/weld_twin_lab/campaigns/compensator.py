@@ -9,7 +9,6 @@ Then a clock jumps, the load changes, the model is a wrong one, the tracker is l
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.files.whole_files import read_json
 
 from ..study import options, tabled
 from . import write_result
@@ -114,7 +114,7 @@ def _before(args: argparse.Namespace) -> Known:
     file = Path(args.out)
     if not args.go_on or not file.exists():
         return Known([], [], [])
-    content = json.loads(file.read_text(encoding='utf-8'))
+    content = read_json(file)
     if content['seed'] != args.seed:
         raise DataError(
             f"the goals of '{file}' were drawn with --seed {content['seed']}; go on with it"

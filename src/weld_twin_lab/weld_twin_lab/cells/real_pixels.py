@@ -22,6 +22,7 @@ from weld_twin_core.effects.effect import Effect
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_msgs_py.tables import read_camera, read_pixels, read_target
 
+from ..blind.displacement import rms
 from ..real_arms.sources import motoman
 from ..real_arms.unseen import ALIGN, PLAIN, plain_fit, residual
 
@@ -78,5 +79,4 @@ def _left(train: Recording, judged: Recording, robot: Robot, known: tuple[Effect
     problem = Problem((usable(train),), ALIGN)
     start = initial_frames(problem, Model(robot, (robot.T_world_base,), known))
     model = fit(problem, start, problem.unit_scale()).model
-    away = residual(model, train, judged)[:3]
-    return float(1e3 * np.sqrt((away**2).sum(axis=0).mean()))
+    return 1e3 * rms(residual(model, train, judged)[:3].T)

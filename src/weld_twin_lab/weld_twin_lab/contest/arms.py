@@ -16,7 +16,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.markdown import table
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import read_json, write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
 from ..real_arms.splits import Split, all_splits
@@ -47,8 +47,7 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     """
     out.mkdir(parents=True, exist_ok=True)
     if (out / MEASURED).exists():
-        kept = json.loads((out / MEASURED).read_text(encoding='utf-8'))
-        return {name: np.array(rows) for name, rows in kept.items()}
+        return {name: np.array(rows) for name, rows in read_json(out / MEASURED).items()}
     measured: dict[str, Array] = {}
     for split in all_splits(ur5, ur10):
         if split.kind in KINDS:

@@ -4,19 +4,18 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import read_json, write_json
 from weld_twin_msgs_py.robots import load_robot
 
 from ..benchmark.costs import cost_of
@@ -50,10 +49,10 @@ class Run:
     answer: ContestAnswer | None
     """None where it gave none."""
     seconds: float
-    """Of processor time, start of the interpreter included [s]."""
+    """Of processor time, the start of the interpreter and its imports included [s]."""
     memory_bytes: int
     trouble: str = ''
-    """Why there is no answer."""
+    """Why there is no answer: the last that it said where it failed."""
 
 
 def opened(cases: Path, truths: Path, out: Path) -> list[str]:
@@ -141,41 +140,29 @@ def _start(words: Sequence[str], case: Path, place: Path) -> None:
     """Have a case answered, and keep what that took."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    write_text(place / RUN, json.dumps(ended(words, case, place)._asdict(), indent=1) + '\n')
+    write_json(place / RUN, ended(words, case, place))
 
 
 def _kept(place: Path, count: int) -> Run:
     """Return what came of a run; an answer out of form is none."""
-    end = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
-    used = end.seconds, end.memory_bytes
-    if end.trouble:
-        return Run(None, *used, end.trouble)
+    run = Run(None, **read_json(place / RUN))
     try:
-        return Run(read_answer(place, count), *used)
+        return run if run.trouble else replace(run, answer=read_answer(place, count))
     except DataError as error:
-        return Run(None, *used, str(error))
+        return replace(run, trouble=str(error))
 
 
-class Ended(NamedTuple):
-    """How a run ended."""
-
-    seconds: float
-    """Of processor time, the start of the interpreter and its imports included [s]."""
-    memory_bytes: int
-    trouble: str = ''
-    """The last that it said where it failed; empty where it did not."""
-
-
-def ended(words: Sequence[str], case: Path, place: Path) -> Ended:
+def ended(words: Sequence[str], case: Path, place: Path) -> dict[str, Any]:
     """
-    Have the answer to a case written to a place.
+    Have the answer to a case written to a place; return what a `Run` says of it beside the answer.
 
     words: the command of a method, with {case} and {out} in it.
     """
     filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
     with (place / SAID).open('w', encoding='utf-8') as said:
         code, cost = cost_of(filled, said=said, limit=LIMIT)
-    return Ended(cost.cpu, int(cost.peak), _trouble(place, code))
+    used = {'seconds': cost.cpu, 'memory_bytes': int(cost.peak)}
+    return {**used, 'trouble': _trouble(place, code)}
 
 
 def _trouble(place: Path, code: int) -> str:

@@ -24,6 +24,7 @@ from weld_twin_core.arm.rotation import matrix_from_quaternion, quaternion_from_
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_msgs_py.files.whole_files import write_json
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind.achieved import measured_of
@@ -113,7 +114,7 @@ def write_case(
         'stations': train.joints.static,
         'wrench_frame': train.wrench_frame,
     }
-    (folder / _CASE).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    write_json(folder / _CASE, content)
     for use, recording in (('train', train), ('ask', ask)):
         _write_inputs(folder, use, recording)
     measured, asked = measured_of(train), measured_of(ask)
@@ -206,7 +207,7 @@ def write_answer(folder: Path, answer: ContestAnswer) -> None:
         'unknown': answer.unknown,
         'none': answer.none,
     }
-    (folder / ANSWER).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    write_json(folder / ANSWER, content, overwrite=True)
     parts = [answer.predicted, *([] if answer.sigma is None else [answer.sigma])]
     _write(folder / PREDICTED, ['x', 'y', 'z', 'sx', 'sy', 'sz'][: 3 * len(parts)], parts)
 

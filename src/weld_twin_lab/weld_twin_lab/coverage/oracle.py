@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.fit import Fit, robust_fit
@@ -23,7 +22,7 @@ from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 
 from ..blind.making import SealedCase
-from .held import HOLD, twin_for
+from .held import HOLD, inside_region, twin_for
 
 UNSEEN = 1e-9
 """Least size of a column in noises; one that does nothing in the recording counts as known."""
@@ -97,12 +96,10 @@ def _posterior(problem: Problem, found: Fit, scale: Scale, train: Recording) -> 
 
 def _missed(errors: Array, covariances: Array) -> float:
     """Return the least variance per axis [m^2] that makes regions hold as many errors as they shall."""
-    limit = float(chi2.ppf(HOLD, 3))
 
     def held(variance: float) -> bool:
-        whole = covariances + variance * np.eye(3)
-        solved = np.linalg.solve(whole, errors[..., None])[..., 0]
-        return bool(((errors * solved).sum(axis=1) <= limit).mean() >= HOLD)
+        wider = np.full(len(errors), np.sqrt(variance))
+        return bool(inside_region(errors, covariances, wider).mean() >= HOLD)
 
     low, high = 1e-18, max(1e-18, float((errors**2).sum(axis=1).max()))
     for _ in range(STEPS):

@@ -13,14 +13,12 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import TwinError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.recording import JointMotion, Recording
 
-from ..blind.cause_sizes import Cause
+from ..blind.blind_cell import at_stations
 from ..blind.recorded_motion import RATE
 from ..fleet.cheap_years import cheap_year
 from ..fleet.full_years import CHECKS, base
-from ..plant.plant import run
-from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
 from ..programs.cells import CELLS
 from ..programs.corrections import promised_and_true, seam_driven
@@ -77,11 +75,11 @@ def of_touches(seed: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 1])
     places = [*SOCKETS, np.array(PLACE)]
     q = np.concatenate([postures_at(case.robot, place, EACH, rng) for place in places])
-    true = _true(case.robot.to_mapping(), case.cause, q)
-    assert true.measured is not None
-    told = twin_for(found.model, case.recording, true).poses(true, true.measured.t).position
-    seen = replace(true.measured, position=_where_it_stands(true.measured.position, told))
-    return entry | of_motion(found, case.recording, replace(true, measured=seen))
+    real = at_stations(case.robot, [case.cause], q, Tracker(), np.random.default_rng(0))
+    asked = Recording('true', JointMotion(real.t, q, static=True))
+    told = twin_for(found.model, case.recording, asked).poses(asked, real.t).position
+    seen = replace(real, position=_where_it_stands(real.position, told))
+    return entry | of_motion(found, case.recording, asked.with_measured(seen))
 
 
 def _where_it_stands(points: Array, told: Array) -> Array:
@@ -89,14 +87,6 @@ def _where_it_stands(points: Array, told: Array) -> Array:
     middle, goal = points.mean(axis=0), told.mean(axis=0)
     turn, _ = Rotation.align_vectors(told - goal, points - middle)
     return np.asarray(goal + turn.apply(points - middle))
-
-
-def _true(robot: dict[str, Any], cause: Cause, q: Array) -> Recording:
-    """Return where the plant's tool is at stations."""
-    t = 1.0 + np.arange(float(len(q)))
-    rng = np.random.default_rng(0)
-    seen = run(robot, [cause], Command(t, q, static=True), Tracker(), rng)
-    return Recording('true', JointMotion(t, q, static=True), Measurements(t, seen.position))
 
 
 def of_years(seed: int, number: int) -> dict[str, Any]:

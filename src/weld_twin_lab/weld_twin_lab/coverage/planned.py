@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 from weld_twin_core.diagnosis.predicting.planned import (
@@ -19,12 +17,11 @@ from weld_twin_core.diagnosis.predicting.planned import (
     clear_postures,
     plan_stations,
 )
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.posterior import expected_poses, largest_sigma
 
+from ..blind.blind_cell import at_stations
 from ..blind.everywhere import small_errors
-from ..plant.plant import run
-from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
@@ -56,15 +53,16 @@ def carried_out(seed: int) -> dict[str, Any]:
     count = COUNTS[seed // len(ARMS) % len(COUNTS)]
     plan = plan_stations(robot, count, TOLERANCE, NOISE)
     flaws = [*FRAMES, *small_errors(robot, rng)]
-    measured = _measured(robot, flaws, plan.q, NOISE, rng)
-    found = diagnose(measured, robot, align='base,tool')
+    noisy = Tracker(sigma=NOISE, orientation=False)
+    seen = at_stations(robot, flaws, plan.q, noisy, rng)
+    motion = JointMotion(seen.t, plan.q, static=True)
+    found = diagnose(Recording('plan', motion, seen), robot, align='base,tool')
     others = clear_postures(robot, SPREAD)[-UNSEEN:]
-    true = _measured(robot, flaws, others, 0.0, rng)
-    assert true.measured is not None
+    true = at_stations(robot, flaws, others, Tracker(orientation=False), rng).position
     assert found.posterior is not None
-    still = _still('others', others)
+    still = Recording('others', JointMotion(np.arange(float(len(others))), others, static=True))
     middle, _ = expected_poses(found.posterior, found.model.twin(0), still, still.joints.t)
-    off = true.measured.position - middle.position
+    off = true - middle.position
     length = np.linalg.norm(off, axis=1)
     judged = clear_postures(robot, SPREAD)[:JUDGED]
     return {
@@ -80,17 +78,3 @@ def carried_out(seed: int) -> dict[str, Any]:
         'kept_sigma_m': float(largest_sigma(np.einsum('mi,mj->ij', off, off)[None] / len(off))[0]),
         'kept_within': float((length < TOLERANCE).mean()),
     }
-
-
-def _still(name: str, q: Array) -> Recording:
-    return Recording(name, JointMotion(np.arange(float(len(q))), q, static=True))
-
-
-def _measured(
-    robot: Robot, flaws: list[dict[str, Any]], q: Array, noise: float, rng: np.random.Generator
-) -> Recording:
-    """Return what the plant's instrument sees at stations."""
-    t = 1.0 + np.arange(float(len(q)))
-    tracker = Tracker(sigma=noise, orientation=False)
-    seen = run(robot.to_mapping(), flaws, Command(t, q, static=True), tracker, rng)
-    return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))

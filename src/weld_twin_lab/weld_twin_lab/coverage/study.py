@@ -18,6 +18,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.task_pool import Task
 
+from ..blind.displacement import rms
 from ..programs.cells import CELLS
 from ..real_arms.splits import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
@@ -93,8 +94,7 @@ def _of_shrink(split: Split, other: Recording, found: Diagnosis, region: str) ->
     assert found.shrink is not None
     bare = plain_fit(split.train, catalog.load(split.robot), (), frozenset(ALIGN))
     before, after = (
-        float(np.sqrt((residual(model, split.train, other)[:3] ** 2).sum(axis=0).mean()))
-        for model in (bare, found.model)
+        rms(residual(model, split.train, other)[:3].T) for model in (bare, found.model)
     )
     told = told_shrink(found.shrink, after / before, region)
     return {**told, 'ci90': told['ci95']}

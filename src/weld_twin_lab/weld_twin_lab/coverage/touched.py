@@ -17,7 +17,9 @@ from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, spreads
 from weld_twin_core.motion.inverse.newton import STRETCHED, least_step, reaching
 from weld_twin_core.recording import JointMotion, Recording
 
+from ..blind.blind_cell import at_stations
 from ..blind.cause_sizes import AT_REST, Cause, draw, scaled
+from ..plant.tracker import Tracker
 
 ROUNDS = 4
 """Newton steps in which the plant is made to touch: each leaves a hundredth of what was off."""
@@ -123,16 +125,10 @@ def _touching(
     q: postures to start from, shape (M, n) [rad or m].
     places: where each touch takes place, shape (M, 3) [m].
     """
-    from ..plant.plant import run
-    from ..plant.plant_recording import Command
-    from ..plant.tracker import Tracker
-
-    t = 1.0 + np.arange(float(len(q)))
     for _ in range(ROUNDS):
-        command = Command(t, q, static=True)
-        real = run(robot.to_mapping(), list(causes), command, Tracker(), rng)
-        q = q + least_step(jacobian(robot, q)[:, :3], places - real.position, STRETCHED)
+        real = at_stations(robot, causes, q, Tracker(), rng).position
+        q = q + least_step(jacobian(robot, q)[:, :3], places - real, STRETCHED)
     names = tuple(Contact(name) for name in dict.fromkeys(labels))
-    motion = JointMotion(t, q, static=True)
+    motion = JointMotion(1.0 + np.arange(float(len(q))), q, static=True)
     touched = Contacts(Artefact(names, TIES), tuple(labels))
     return Recording('plant', motion, contacts=touched)

@@ -22,7 +22,7 @@ from weld_twin_core.diagnosis.advice.candidates import LONGER
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import Measurements, Recording
+from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, with_changes
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
@@ -34,12 +34,17 @@ from ..blind.making import SealedCase, draw_case, one_arm
 from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
 from ..blind.seal import text_digest
+from ..gate.sound import seen_from
 
 FOLLOWING, STATES = 30.0, 62.5
 """Rates [Hz] of an instrument that follows the tool in an experiment, and of the joint states beside it.
 Twice as many say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
 SECONDS = (12.0, 25.0)
 """Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
+ELSEWHERE = transform(
+    Rotation.from_rotvec([0.05, -0.03, 0.7]).as_matrix(), np.array([1.2, -0.9, 0.1])
+)
+"""The frame of before in that of an instrument at another place, turned another way."""
 STAY = 15.0
 """A station with the way to it [s], as experiments are planned."""
 
@@ -107,7 +112,7 @@ class SealedCell:
             cell = replace(cell, robot=_changed(cell.robot, self._changed[name]))
         taken = of_motion(cell, motion, rng)
         made = as_recording(name, record(cell, self._case.causes, taken))
-        return _from_elsewhere(made) if changed == 'instrument' else made
+        return seen_from(made, ELSEWHERE) if changed == 'instrument' else made
 
     def seen_anew(self, recordings: Sequence[Recording]) -> bool:
         """Return whether tool or instrument was changed for one of the recordings."""
@@ -157,16 +162,6 @@ def _changed(robot: Robot, change: SetUpChange) -> Robot:
         longer = transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
         return robot.with_frames(tool=robot.T_flange_tool @ longer)
     return robot
-
-
-def _from_elsewhere(recording: Recording) -> Recording:
-    """Return the recording as an instrument at another place, turned another way, measures it."""
-    assert recording.measured is not None
-    turn = Rotation.from_rotvec([0.05, -0.03, 0.7]).as_matrix()
-    seen = recording.measured
-    rotation = None if seen.rotation is None else turn @ seen.rotation
-    position = seen.position @ turn.T + np.array([1.2, -0.9, 0.1])
-    return recording.with_measured(Measurements(seen.t, position, rotation))
 
 
 def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:

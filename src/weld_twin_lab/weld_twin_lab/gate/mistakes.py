@@ -15,6 +15,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Measurements, Recording
 
+from ..blind.displacement import rms
 from .sound import Sound, seen_from
 
 Made = tuple[Robot, Recording, str]
@@ -201,8 +202,7 @@ def _untaken(robot: Robot, q: Array, poses: Array) -> float:
     prior = np.diag(np.r_[np.zeros(9), np.full(robot.n, SEEN_AT_ALL)])
     system, wanted = np.vstack([design, prior]), np.r_[remaining.ravel(), np.zeros(len(prior))]
     taken = design @ np.linalg.lstsq(system, wanted, rcond=None)[0]
-    remaining = remaining - taken.reshape(-1, 3)
-    return float(np.sqrt((remaining**2).sum(axis=1).mean()))
+    return rms(remaining - taken.reshape(-1, 3))
 
 
 def _middle(sound: Sound, rng: np.random.Generator) -> Array:

@@ -30,6 +30,7 @@ from weld_twin_core.effects.plausible import plausible
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
 
+from ..blind.displacement import rms
 from .rows import ArmRow, size
 
 TINY = 1e-12
@@ -299,8 +300,7 @@ def _left(
             np.sqrt(remaining @ remaining / max(target.size - determined, 0.1 * target.size))
         )
     seen, columns = judged.rows(part, among)
-    error = (seen - step @ columns).reshape(-1, judged.width)[:, :3]
-    return float(np.sqrt((error**2).sum(axis=1).mean()))
+    return rms((seen - step @ columns).reshape(-1, judged.width)[:, :3])
 
 
 def _parts(recording: Recording) -> list[NDArray[np.bool_]]:

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import spreads
 from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
+from ..blind.displacement import rms
 from ..study import tabled
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
@@ -263,10 +263,10 @@ def _unseen(one: ArmRow, diagnosis: Diagnosis) -> dict[str, float] | None:
     if one.other.contacts is not None:
         return {'product': _spread(diagnosis.model, one.other)}
     fitted, other, allowed = one.fitted, one.other, diagnosis.posterior
-    out = {'product': _rms(residual(diagnosis.model, fitted, other, allowed)[:3])}
+    out = {'product': rms(residual(diagnosis.model, fitted, other, allowed)[:3].T)}
     for name, families in PLAIN.items():
         model = plain_fit(fitted, one.robot, families, frozenset(one.align))
-        out[name] = _rms(residual(model, fitted, other)[:3])
+        out[name] = rms(residual(model, fitted, other)[:3].T)
     return out
 
 
@@ -275,7 +275,3 @@ def _spread(model: Model, other: Recording) -> float:
     points = model.twin(0).poses(other, other.joints.t).position
     each = np.concatenate(list(spreads(other.contacts, points).values()))
     return float(np.sqrt((each**2).mean()))
-
-
-def _rms(parts: Array) -> float:
-    return float(np.sqrt((parts**2).sum(axis=0).mean()))

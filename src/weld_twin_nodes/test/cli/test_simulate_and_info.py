@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""`simulate`, `info` and what every subcommand does with bad input."""
+"""`simulate`, `info` and what every subcommand does with bad input, and with a robot in a folder."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.bags import BagReader, provenance, read_recording
 from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.robots import load_robot, write_robot_yaml
 
 ROBOT = catalog.load('ur5')
 
@@ -232,3 +233,29 @@ def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_p
     assert result.code == 2
     assert 'no measurement meets a pose of the twin' in result.err
     assert not (tmp_path / 'bag').exists()
+
+
+@pytest.fixture
+def cell7(tmp_path, monkeypatch):
+    """Return the file of a robot of one's own: an arm on a plinth."""
+    monkeypatch.setenv('WELD_TWIN_ROBOTS', str(tmp_path / 'robots'))
+    raised = catalog.load('kuka_kr16_2')
+    base = raised.T_world_base.copy()
+    base[2, 3] = 0.75
+    (tmp_path / 'robots').mkdir()
+    file = tmp_path / 'robots/cell7.yaml'
+    write_robot_yaml(file, raised.with_frames(base=base))
+    return file
+
+
+def test_commands_take_it_and_info_lists_it(weld_twin, cell7, tmp_path):
+    heights = {}
+    for robot in ('cell7', 'kuka_kr16_2'):
+        words = ('--robot', robot, '--path', 'line', '--rate', 20, '--out', tmp_path / robot)
+        said = weld_twin('simulate', *words)
+        assert said.code == 0, said.err
+        bag = read_recording(tmp_path / robot, load_robot(robot))
+        heights[robot] = bag.measured.position[:, 2].mean()
+    assert heights['cell7'] - heights['kuka_kr16_2'] == pytest.approx(0.75, abs=1e-9)
+    listed = weld_twin('bag', '--robots').out
+    assert listed.splitlines()[-1].split() == ['cell7', 'your', 'own', str(cell7)]

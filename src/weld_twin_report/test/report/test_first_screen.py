@@ -1,13 +1,16 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The first screen answers what a fitter asks first, and what misled a reader once does so no more."""
+"""The first screen answers what a fitter asks first, without what misled one; no word is broken."""
 
 from __future__ import annotations
 
+import diagnoses
 import pytest
+from rich.console import Console
 
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_nodes.wording.quantities import in_short, short_rows
+from weld_twin_report.report import print_summary
 from weld_twin_report.report.charts import furthest
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.to_do import warned
@@ -51,3 +54,20 @@ def test_what_not_to_do_stands_out():
     told = ''.join(map(str, warned('Turn 0.5 deg. Do not correct programs by its curve: 0.1 mm.')))
     assert told == ('Turn 0.5°. <strong>Do not correct programs by its curve: 0.1 mm.</strong>')
     assert warned('Turn.') == ['Turn.']
+
+
+@pytest.fixture(scope='module', params=[diagnoses.backlash, diagnoses.unknown])
+def made(request):
+    return request.param()
+
+
+@pytest.mark.parametrize('width', [40, 80, 140])
+def test_no_word_is_broken(made, width, capsys):
+    wide, narrow = (Console(highlight=False, width=w) for w in (400, width))
+    print_summary(made, wide)
+    whole = set(capsys.readouterr().out.split())
+    print_summary(made, narrow)
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= width
+    heads = {f'{word}:' for word in whole} | {'error:'}
+    assert [word for word in shown.split() if word not in whole | heads] == []

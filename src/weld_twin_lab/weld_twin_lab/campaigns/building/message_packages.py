@@ -10,7 +10,6 @@ middleware, as `rosidl_generate_interfaces` does in a workspace. The result is k
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
 import subprocess
@@ -22,7 +21,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from unittest.mock import patch
 
 from weld_twin_core.errors import TwinError
 
@@ -103,6 +102,8 @@ NEEDED = (
 """Packages whose types they are made of."""
 SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
 """Type supports that rmw_fastrtps_cpp asks for; the second tells of the type on the graph."""
+JOINT = 'rosidl_typesupport_c'
+"""The one that leads to these."""
 PREFIX = Path(sys.prefix)
 BUILT = 'weld_twin_messages_'
 """How the folders of packages begin that were built here."""
@@ -179,7 +180,8 @@ def _build(package: str, folder: Path) -> None:
             (place / kind).mkdir(parents=True)
         for name, text in texts.items():
             (source / kind / f'{name}.{kind}').write_text(text)
-    with redirect_stdout(StringIO()):  # the generators tell of every file
+    # The generators tell of every file, and look for their templates where this says.
+    with redirect_stdout(StringIO()), patch.dict(os.environ, AMENT_PREFIX_PATH=str(PREFIX)):
         _generate(package, source, made, site)
     (site / '__init__.py').touch()
     _compile(package, folder, made, site)
@@ -191,77 +193,31 @@ def _interfaces(package: str) -> dict[str, Mapping[str, str]]:
     return {kind: texts for kind, texts in kinds.items() if texts}
 
 
-def _names(package: str) -> list[str]:
-    """Return kind and name of the interfaces of a package, as 'msg/InterfaceValue'."""
-    return [
-        f'{kind}/{name}' for kind, texts in _interfaces(package).items() for name in sorted(texts)
-    ]
-
-
 def _generate(package: str, source: Path, made: Path, site: Path) -> None:
     """Run the generators of ROS over the definitions."""
-    import rosidl_generator_c
-    import rosidl_generator_py
-    import rosidl_generator_type_description
-    import rosidl_typesupport_c
-    import rosidl_typesupport_fastrtps_c
-    import rosidl_typesupport_introspection_c
-    from rosidl_adapter.action import convert_action_to_idl
-    from rosidl_adapter.msg import convert_msg_to_idl
+    from rosidl_adapter.cli import TranslateActionToIDL, TranslateMsgToIDL
+    from rosidl_generator_c.cli import GenerateC
+    from rosidl_generator_py.cli import GeneratePython
+    from rosidl_generator_type_description.cli import HashTypeDescription
+    from rosidl_typesupport_c.cli import GenerateCTypesupport
+    from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
+    from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
 
-    convert = {'msg': convert_msg_to_idl, 'action': convert_action_to_idl}
-    for name in _names(package):
-        kind = name.partition('/')[0]
-        convert[kind](source, package, Path(f'{name}.{kind}'), source / kind)
-    common = _arguments(package, source, made)
-    joint = made / 'rosidl_typesupport_c'
-    describe = rosidl_generator_type_description.generate_type_hash
-    fast = rosidl_typesupport_fastrtps_c.generate_typesupport_fastrtps_c
-    introspect = rosidl_typesupport_introspection_c.generate_c
-    for generator, action, out, more in (
-        ('rosidl_generator_type_description', describe, made, ()),
-        ('rosidl_generator_c', rosidl_generator_c.generate_c, made, ()),
-        (SUPPORTS[0], fast, made / SUPPORTS[0], ()),
-        (SUPPORTS[1], introspect, made / SUPPORTS[1], ()),
-        ('rosidl_typesupport_c', rosidl_typesupport_c.generate_c, joint, (list(SUPPORTS),)),
-        (
-            'rosidl_generator_py',
-            rosidl_generator_py.generate_py,
-            site,
-            (['rosidl_typesupport_c'],),
-        ),
+    include = [str(PREFIX / 'share' / own) for own in NEEDED]
+    translators = {'msg': TranslateMsgToIDL('msg'), 'action': TranslateActionToIDL('action')}
+    files: list[str] = []
+    for kind, texts in _interfaces(package).items():
+        given = [f'{source}:{kind}/{name}.{kind}' for name in sorted(texts)]
+        files += translators[kind].translate(package, given, include, source)
+    hashes = HashTypeDescription('hash').generate_type_hashes(package, files, include, made)
+    GenerateC('c').generate(package, files, include, made, hashes)
+    for generator, out in (
+        (GenerateFastRTPSCTypesupport('fast'), made / SUPPORTS[0]),
+        (GenerateIntrospectionCTypesupport('introspect'), made / SUPPORTS[1]),
+        (GenerateCTypesupport('joint', typesupport_implementations=SUPPORTS), made / JOINT),
+        (GeneratePython('py', typesupport_implementations=[JOINT]), site),
     ):
-        file, resource = source / f'{generator}.json', PREFIX / 'share' / generator / 'resource'
-        given = {**common, 'output_dir': str(out), 'template_dir': str(resource)}
-        file.write_text(json.dumps(given))
-        action(str(file), *more)
-        _write_visibility(package, resource, out)
-
-
-def _arguments(package: str, source: Path, made: Path) -> dict[str, Any]:
-    """Return what all generators are told."""
-    names, share = _names(package), PREFIX / 'share'
-    return {
-        'package_name': package,
-        'idl_tuples': [f'{source}:{name}.idl' for name in names],
-        'ros_interface_dependencies': [
-            f'{own}:{idl}' for own in NEEDED for idl in (share / own).glob('*/*.idl')
-        ],
-        'ros_interface_files': [
-            str(source / f'{name}.{name.partition("/")[0]}') for name in names
-        ],
-        'type_description_tuples': [f'{name}.idl:{made / name}.json' for name in names],
-        'include_paths': [f'{own}:{share / own}' for own in NEEDED],
-        'target_dependencies': [],
-    }
-
-
-def _write_visibility(package: str, resource: Path, out: Path) -> None:
-    """Write the header that says which symbols a library shows."""
-    for template in resource.glob('*visibility_control.h.in'):
-        text = template.read_text().replace('@PROJECT_NAME_UPPER@', package.upper())
-        header = out / 'msg' / template.name.removesuffix('.in')
-        header.write_text(text.replace('@PROJECT_NAME@', package))
+        generator.generate(package, files, include, out)
 
 
 def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
@@ -273,7 +229,7 @@ def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
     """
     include = folder / 'include' / package
     include.mkdir(parents=True)
-    for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / 'rosidl_typesupport_c', made):
+    for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / JOINT, made):
         for kind in _interfaces(package):
             shutil.copytree(place / kind, include / kind, dirs_exist_ok=True)
     support = {name: sorted((made / name).rglob('*.c*')) for name in SUPPORTS}
@@ -281,9 +237,9 @@ def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
     link = _Linker(folder, site)
     base = link(f'lib{package}__rosidl_generator_c.so', structures, [])
     others = [link(f'lib{package}__{name}.so', support[name], [base]) for name in SUPPORTS]
-    module = f'{package}_s__rosidl_typesupport_c{sysconfig.get_config_var("EXT_SUFFIX")}'
-    sources = [*site.rglob('*_s.c'), site / f'_{package}_s.ep.rosidl_typesupport_c.c']
-    sources += sorted((made / 'rosidl_typesupport_c').rglob('*.cpp'))
+    module = f'{package}_s__{JOINT}{sysconfig.get_config_var("EXT_SUFFIX")}'
+    sources = [*site.rglob('*_s.c'), site / f'_{package}_s.ep.{JOINT}.c']
+    sources += sorted((made / JOINT).rglob('*.cpp'))
     link(module, sources, [base, *others])
 
 

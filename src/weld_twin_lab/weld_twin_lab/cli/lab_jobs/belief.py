@@ -41,8 +41,11 @@ def run(study: Study) -> None:
     """Make what is not made yet, fit, judge, write and print the page."""
     from weld_twin_core.errors import DataError
 
+    from ...belief.judged import examples_of
+    from ...belief.learning import unseen
     from ...belief.rows import read_rows, write_rows
-    from ...belief.study import fit, rows_of, with_oracle, write
+    from ...belief.study import fit, judged, rows_of, with_oracle
+    from ...belief.table import page
 
     args = study.args
     if args.cases or args.held_out:
@@ -61,7 +64,12 @@ def run(study: Study) -> None:
     write_rows(study.out / LEARNED, taught)
     if tried:
         write_rows(study.out / JUDGED, tried)
-    print(write(study.out, fit(taught, args.risk), tried, taught), end='')
+    content = fit(taught, args.risk)
+    examples = examples_of(tried) if tried else unseen(examples_of(taught), content)
+    result = judged(content, tried, examples)
+    study.write('weights', content)
+    study.write('results', result)
+    study.write('belief', page=page(result))
 
 
 def _refuse_shared(taught: list[dict[str, object]], tried: list[dict[str, object]]) -> None:

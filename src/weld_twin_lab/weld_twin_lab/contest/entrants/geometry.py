@@ -17,6 +17,7 @@ from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 
 from ..open_form import ContestAnswer, ContestCase
+from .residual import as_causes
 
 FAMILY = {'a': 'link_length', 'd': 'link_length', 'alpha': 'link_twist', 'theta': 'joint_offset'}
 """What a library of effects calls an error of each DH value."""
@@ -55,10 +56,7 @@ def answer_with(case: ContestCase, free: tuple[str, ...]) -> ContestAnswer:
     ):
         if name in FAMILY and abs(value) > SURE_AT * error:
             moved[FAMILY[name], case.robot.joint_names[row]] += float(effect) ** 2
-    whole = sum(moved.values())
-    causes = tuple(
-        ((*at, share / whole),) for at, share in sorted(moved.items(), key=lambda item: -item[1])
-    )
+    causes = as_causes(moved)
     q, _ = case.ask.joints.at(case.times)
     predicted = forward(fitted.robot, q)[:, :3, 3]
     return ContestAnswer(predicted, causes, none=0.0 if causes else 1.0)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ..open_form import ContestAnswer, ContestCase
+from ..open_form import Cause, ContestAnswer, ContestCase
 
 Learn = Callable[[Array, Array, Array], tuple[Array, Array | None]]
 """
@@ -33,6 +33,13 @@ def answer_of(case: ContestCase, learn: Learn, most: int | None = None) -> Conte
     added, sigma = learn(known, off(case)[rows], features(case.ask.joints, case.times))
     there = nominal(case, case.ask.joints, case.times)
     return ContestAnswer(there + added, unknown=1.0, sigma=sigma)
+
+
+def as_causes(sizes: Mapping[tuple[str, str | None], float]) -> tuple[Cause, ...]:
+    """Return causes by their sizes, the largest first, each as likely as its share of the whole."""
+    whole = sum(sizes.values())
+    ranked = sorted(sizes.items(), key=lambda item: -item[1])
+    return tuple(((*at, size / whole),) for at, size in ranked)
 
 
 def nominal(case: ContestCase, motion: JointMotion, t: Array) -> Array:

@@ -14,8 +14,9 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
+from ...blind.displacement import rms
 from ..open_form import ContestAnswer, ContestCase
-from .residual import nominal, off
+from .residual import as_causes, nominal, off
 
 TERMS = ('joint_offset', 'transmission_ripple', 'transmission_ripple', 'servo_lag', 'backlash')
 """What a constant, a sine, a cosine, a velocity and its sign in a joint's error stand for."""
@@ -45,10 +46,7 @@ def answer(case: ContestCase) -> ContestAnswer:
         if weight != 0.0:
             at = TERMS[term], case.robot.joint_names[joint]
             shares[at] += float(((columns[:, k] * weight) ** 2).mean())
-    whole = sum(shares.values())
-    causes = tuple(
-        ((*at, share / whole),) for at, share in sorted(shares.items(), key=lambda item: -item[1])
-    )
+    causes = as_causes(shares)
     predicted = nominal(case, case.ask.joints, case.times) + (asked @ weights).reshape(-1, 3)
     return ContestAnswer(predicted, causes, none=0.0 if causes else 1.0)
 
@@ -76,5 +74,4 @@ def _columns(case: ContestCase, motion: JointMotion, t: Array) -> Array:
 
 def _reach(case: ContestCase, motion: JointMotion, t: Array) -> float:
     """Return how far the tool is from the base, RMS [m]: what a small turn is multiplied by."""
-    where = nominal(case, motion, t) - case.robot.T_world_base[:3, 3]
-    return float(np.sqrt((where**2).sum(axis=1).mean()))
+    return rms(nominal(case, motion, t) - case.robot.T_world_base[:3, 3])

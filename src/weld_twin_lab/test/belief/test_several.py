@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
-from weld_twin_lab.belief.judged import kept
+from weld_twin_lab.belief.judged import kept, sets_hold
 from weld_twin_lab.belief.mix import CROWDED, MOST, SEVERAL, drawn, lot_of
 from weld_twin_lab.belief.trial import diagnosed, recordings_of, tried
 from weld_twin_lab.belief.visible import shown
@@ -86,6 +86,20 @@ def test_what_was_taken_out_is_to_be_left_and_said_to_be():
     assert whole(hidden, said([PLAY], status='unknown')).right
     # What no motion tells from it stands for it.
     assert whole(hidden, said([PLAY], [LINK, ZERO])).right
+
+
+@pytest.mark.parametrize(('wide', 'hold'), [(3, True), (4, False)])
+def test_a_set_too_wide_for_a_name_counts_where_all_of_it_predicts_as_the_cause_does(wide, hold):
+    sites = [PLAY, LINK, ZERO, ('gear_ratio', 'wrist_1_joint')][:wide]
+    members = [
+        {'effect': effect, 'joint': joint, 'left': 1e-5 if (effect, joint) == PLAY else 3e-5}
+        for effect, joint in sites
+    ]
+    at_work = {'truth': {**truth(PLAY), 'at_work': [PLAY]}}
+    row = {**at_work, 'sealed': {'floor': 1e-5, 'members': [members]}}
+    assert sets_hold(row) == hold
+    as_well = [{**own, 'left': 1e-5} for own in members]
+    assert sets_hold({**row, 'sealed': {'floor': 1e-5, 'members': [as_well]}})
 
 
 def row(*causes, model=(PLAY,), after=1e-5):

@@ -3,8 +3,8 @@
 """
 What each level of an answer was worth: examples to learn belief from.
 
-An answer is right as the blind check judges it; besides, each member of a set must predict the
-sealed recording as the cause at work does, unless the kinematics make them one error.
+An answer is right as the blind check judges it; besides, each member of a set too wide for a name
+must predict the sealed recording as the cause at work does, unless the kinematics make them one error.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
 from .there import HALF, LARGE
 from .there import right as right_everywhere
-from .whole import FEW, whole
+from .whole import FEW, WIDEST, whole
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -99,7 +99,7 @@ def _right(row: Mapping[str, Any], judgement: Judged) -> bool:
     right = judgement.right
     if 'shown' in row['truth'] and not (right and judgement.kind in FEW):
         right = whole(row['truth'], row['verdict']).right
-    return right and _sets_hold(row)
+    return right and sets_hold(row)
 
 
 def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str]) -> bool:
@@ -147,14 +147,14 @@ def _absorbed(row: Mapping[str, Any]) -> list[list[tuple[str, str | None]]]:
     return [kept] if len(kept) < len(sites) else []
 
 
-def _sets_hold(row: Mapping[str, Any]) -> bool:
-    """Return whether each member of a set predicts as well as the right one."""
+def sets_hold(row: Mapping[str, Any]) -> bool:
+    """Return whether each member of a set too wide for a name predicts as well as the right one."""
     at_work = _at_work(row['truth'])
     floor = row['sealed']['floor']
     for group in row['sealed'].get('members', ()):
         remaining = {(item['effect'], item['joint']): item['left'] for item in group}
         right = [site for site in remaining if site in at_work]
-        if len(remaining) < 2 or not right:
+        if len(remaining) <= WIDEST or not right:
             continue
         same = set().union(*(alike_by_structure(row['truth']['robot'], site) for site in right))
         most = min(remaining[site] for site in right) + AS_WELL * floor
@@ -212,14 +212,14 @@ def _of_many(
     row: Mapping[str, Any], whole_right: bool
 ) -> Iterator[tuple[str, Mapping[str, float], bool, float, bool]]:
     """
-    Yield the same of an arm that is off everywhere, of kinds of many small errors alone.
+    Yield the same of an arm that is off everywhere, of names and of kinds of many small errors.
 
-    Every name is at work there, so that others are right by another event.
+    Every name is at work there: one is right if half of what it is said to do is there.
     """
     verdict = row['verdict']
     for said in row['statements']:
         kind, level = said['kind'], said['kind'].split()[0]
-        if not kind.endswith('many'):
+        if kind != 'name' and not kind.endswith('many'):
             continue
         right, sure = whole_right, bool(verdict['sure'])
         if said['cause'] is not None:

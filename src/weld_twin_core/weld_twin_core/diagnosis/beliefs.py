@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every tuned number that decides a verdict, in one place."""
+"""Most tuned numbers that decide a verdict; `calibration/weights.json` has those of probabilities."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Beliefs:
     # Which effects are found -----------------------------------------------------------------
 
     enter_nats: float = 6.0
-    """Evidence [nats] that an effect must be worth to enter and to stay: odds of about 400 to 1,
-    for a hundred or so candidates of which any may enter by chance."""
+    """Evidence (a log Bayes factor, in nats) that an effect must be worth to enter and to stay: about
+    400 to 1, for a hundred or so candidates of which any may enter by chance."""
 
     close_nats: float = 8.0
     """Evidence [nats] below the best within which a candidate is fitted as well: the linear
@@ -132,7 +132,7 @@ class Beliefs:
     # The verdict -----------------------------------------------------------------------------
 
     sure: float = 0.85
-    """Probability from which on a leader is named alone."""
+    """Share of the evidence from which on one name stands alone; not the `sure` of an answer."""
 
     listed: float = 0.03
     """Probability from which on a rival is named beside a leader that is not sure."""
@@ -150,16 +150,16 @@ class Beliefs:
     floor itself is known to a tenth or so, and noise has tails."""
 
     structure_gain: float = 0.03
-    """Share of the squared unseen error that a structure must take away to be one,"""
+    """Share of the squared unseen error that a structure must take away to count."""
 
     structure_sure: float = 3.0
-    """and the same in its standard errors between stretches."""
+    """What it must take away besides, in standard errors between stretches."""
 
     blatant_gain: float = 0.15
-    """The same for a structure so large that a few stretches may hold all of it,"""
+    """Share from which on fewer standard errors do: few stretches may hold all of a large one."""
 
     blatant_sure: float = 1.5
-    """and its standard errors, which are then large as well."""
+    """Standard errors that such a large structure must take away."""
 
     far_above: float = 1.7
     """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found

@@ -72,9 +72,10 @@ def diagnose(
     known : sequence of Effect
         Put into the twin first; what remains is diagnosed.
     exclude : sequence of str
-        Families taken out of the library.
+        Families that are still tried, but never named alone.
     holdout : sequence of Recording
-        Never fitted; judge the shrink. Left out, stretches of the recordings take their turn.
+        No effect is fitted to them; they judge the shrink. Without any, each stretch of the recordings
+        is left out in turn.
     beliefs : Beliefs, optional
         The numbers that decide the verdict; the usual ones when left out.
     apply : bool
@@ -154,7 +155,7 @@ def _explained(
     if examined.posed is None:
         return refusal(examined)
     out = _told(result, examined, holdout, beliefs, limits, progress)
-    # Or is it likelier than not that no name is right?
+    # Where the answer that no name fits is itself probably right, the many are not tried.
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
     if result.many is None or out.status != 'unknown' or _named(out) or nameless:
         return out

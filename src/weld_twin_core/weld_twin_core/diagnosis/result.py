@@ -279,7 +279,7 @@ class Shares:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A hypothesis for the leading effect, with its probability and what it would bring."""
+    """A hypothesis in the place of an effect found, with its probability and what it would bring."""
 
     site: Site
     probability: float
@@ -499,8 +499,8 @@ class Diagnosis:
     status: str
     """'identified', 'ambiguous', 'unknown', 'none' or 'unsound'."""
     effects: tuple[Found, ...]
-    """The effects found, whatever the status, with standard errors; those that move the tool most
-    first."""
+    """The effects that count as named, whatever the status, with standard errors; those that move the
+    tool most first."""
     confidence: float
     """Probability that the whole answer is right, as such answers were."""
     indistinguishable: tuple[tuple[Site, ...], ...]

@@ -3,9 +3,9 @@
 """
 The effects that a verdict names, with their standard errors, and how sure the shares of causes are.
 
-A standard error is the largest of what four reasons give: the covariance of `algebra.columns`; other
-optima that fit nearly as well; formulas that are idealised; and the models that the recordings allow
-besides, in which an arm has a little of every small error.
+A standard error is the larger of what the covariance of `algebra.columns` and other optima that fit
+nearly as well give, with what idealised formulas add in squares; or that of the models that the
+recordings allow besides, in which an arm has a little of every small error, where it is larger.
 
 Of a share three doubts are drawn together: the coordinates of all causes, which hang together as their
 columns do; how much of what is left above the noise belongs to the causes; and how large the noise is
@@ -197,8 +197,8 @@ def with_intervals(
     """
     Return causes with the 90 % intervals of their shares, above a noise of RMS ``floor`` [m].
 
-    Where curves or many small errors stand for the causes, intervals are those that stretches
-    tell.
+    Where the status is unknown, or curves or many small errors stand for the causes, intervals are
+    those that stretches tell.
     """
     curved = len(result.slots) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.slots) or not unseen.parts:

@@ -29,7 +29,7 @@ from ..unseen.groups import Group
 from ..verdict.decision import Verdict
 
 _TOUCHED = 4
-"""The same where contacts measured: every touch that could be made is tried with each."""
+"""Explanations compared where contacts measured: every touch that could be made is tried with each."""
 _NAMELESS = 0.5
 """Confidence of an unknown cause from which what is believed most has no name: it is then likelier
 than not that the library lacks it."""

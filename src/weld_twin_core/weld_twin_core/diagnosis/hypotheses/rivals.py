@@ -3,14 +3,13 @@
 """
 Who else could have done it: for every effect found, the others that would do as well in its place.
 
-Probabilities come from the evidence of fitted alternatives. Families that share a subspace on
-these data tie, and are named together.
+Probabilities come from the evidence of fitted alternatives. Effects that move the tool alike on these
+data get equal probability, and are named together.
 
-What was taken out of the library is held against what is found all the same: a hose may do on these
-motions what a load does. Where one of them fits as well, no data can vouch for the name alone, and
-they are a set. Where it fits clearly better, what was found stands in for a cause that the library
-lacks. The same holds for what is no more than a constant here, as its joint does not move. None of
-these counts for more than what was found.
+Excluded effects are still compared: on some motions a hose moves the tool as a load does. Where one of
+them fits as well, no data can vouch for the name alone, and they are a set. Where it fits clearly
+better, what was found stands in for a cause that the library lacks. The same holds for what is no more
+than a constant here, as its joint does not move. None of these counts for more than what was found.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations of every seed by itself, and the ranking of units that asks for no more.
+Normal equations of each candidate by itself, which are enough to rank the candidates.
 
 A ranking asks what each seed would explain beside the model, never what two seeds would explain
 together. So each seed has a small system of its own, and those of one size are one array.

@@ -3,8 +3,8 @@
 """
 Each cause level by level, with its share of the squared gap.
 
-Every effect that was found stands by itself, whatever the status, and so does a place that curves
-stand for. What is left beside them is one entry more. Shares are what every cause takes off the
+Every effect that counts as named stands by itself, whatever the status, and so does a place that
+curves stand for. What is left beside them is one entry more. Shares are what every cause takes off the
 squared gap on stretches that were not fitted, in proportion to how far it moves the tool along with
 all of them together; with the noise and with what is left they add up to one. What each adds is told
 sample by sample, too, so that causes can be thought away.

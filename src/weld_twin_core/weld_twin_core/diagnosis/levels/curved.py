@@ -98,7 +98,7 @@ def carried(
     """
     Return the model to carry on with, its predictions on unseen stretches, its shrink, the verdict.
 
-    found, unseen, shrink: of the effects found.
+    result, unseen, shrink: of the effects found.
     alternative: the free-form explanation; carried where the verdict is 'unknown' and it predicts
     as well. What makes unseen data worse than the nominal robot does is not carried at all, nor
     told.

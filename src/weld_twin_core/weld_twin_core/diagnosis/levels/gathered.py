@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The evidence for a verdict as plain values, gathered from the fits and from unseen data."""
+"""The evidence for a verdict, gathered from the fits and from unseen data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def gathered(
     """
     Return the evidence for a verdict.
 
-    found, unseen: the search, and unseen stretches under its final model.
+    result, unseen: the search, and unseen stretches under its final model.
     leftover: what generic columns still find beside it.
     shrink: on held-out recordings or on stretches taking their turn.
     families: what each kind accounts for, where many small errors were fitted together.

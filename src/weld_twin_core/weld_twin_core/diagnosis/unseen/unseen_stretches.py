@@ -7,11 +7,11 @@ Stretches are those of time, or regions of posture: what carries over to the nex
 carry over to where the arm has not been.
 
 The found effects are small, so around the final fit every smaller model is linear: the exact
-contribution of each effect is put back into the residual where it is left out, and the coordinates
-of those kept are fitted anew on the other stretches. Normal equations of every stretch are formed
-once; a model is a choice of columns and targets. Frames have the columns of the arm without the
-effects: where a seam or a SCARA hardly tells base from tool, frames move by a metre for nothing,
-and a metre times the turn of an effect that is left out would take that effect's place.
+contribution of each effect is put back into the residual where it is left out, and the coordinates of
+those kept are fitted anew on the other stretches. Normal equations of every stretch are formed once; a
+model is a choice of columns and targets. Where a seam or a SCARA hardly tells base from tool, fitted
+frames can be a metre off, and a metre times the turn of an effect that is left out would take that
+effect's place. So the columns of the frames are those of the arm without the effects.
 """
 
 from __future__ import annotations

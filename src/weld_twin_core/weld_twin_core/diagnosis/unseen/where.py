@@ -3,8 +3,8 @@
 """
 Where the gap lies, what it depends on, and whether something is left that no named effect explains.
 
-Groups of columns without a formula are given to the bare model without effects, and a few of them, for
-the best of many finds more in noise, to the model. If one predicts unseen stretches better beside the
+All groups of columns without a formula are tried without the effects. Only a few are tried beside the
+model: of many, one fits noise by chance. If one predicts unseen stretches better beside the
 model, the residual has structure, and the groups that bring it say what it depends on.
 """
 

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From the table of answers to a verdict: what is told, and is it more than what has no name?
+From the table of answers to a verdict: what has a name, and is that more than what has none?
 
 One rule decides. An effect counts as named where its name is likelier right than wrong. What the
 others explain, and what nothing explains, has no name. Where that is more, or where a cause that has

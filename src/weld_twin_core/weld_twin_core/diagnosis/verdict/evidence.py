@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a verdict is drawn from, as plain values, and the table of answers with its marginals.
+What a verdict is drawn from: values, the fits of the alternatives, and the table of answers.
 
 A row of the table is an effect that the search found, with every other that was fitted in its place
 and what share of the evidence each has. What these data cannot tell apart shares its row. Name, place

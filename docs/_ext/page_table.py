@@ -37,6 +37,14 @@ def _row(cells: Sequence[str]) -> nodes.row:
     row = nodes.row()
     for cell in cells:
         entry = nodes.entry()
-        entry += nodes.paragraph(text=cell)
+        entry += nodes.paragraph('', '', *_marked(cell))
         row += entry
     return row
+
+
+def _marked(cell: str) -> list[nodes.Node]:
+    """Return the text of a cell, with what stands between backticks as code."""
+    parts = cell.split('`')
+    if len(parts) % 2 == 0:  # a backtick that is none of a pair
+        return [nodes.Text(cell)]
+    return [nodes.literal(text=p) if k % 2 else nodes.Text(p) for k, p in enumerate(parts) if p]

@@ -4,10 +4,37 @@
 
 from __future__ import annotations
 
-from weld_twin_core.effects import REGISTRY, Plausible
-from weld_twin_core.effects.effect import SLIDING_UNITS
+from weld_twin_core.effects import REGISTRY, MemoryEffect, Plausible
+from weld_twin_core.effects.effect import SLIDING_UNITS, Effect
 
 HEADER = ('effect', 'parameter', 'unit', 'spread', 'least', 'most', 'source')
+EFFECTS = ('effect', 'of', 'parameters', 'options', 'formula', 'needs', 'memory', 'derivative')
+
+
+def effect_rows() -> list[tuple[str, ...]]:
+    """Return a row for every effect, in the order in which they act."""
+    kinds = sorted(REGISTRY.values(), key=lambda kind: (kind.stage, kind.name))
+    return [
+        (
+            f'`{kind.name}`',
+            kind.of,
+            ', '.join(f'`{p.name}` {p.unit}' for p in kind.parameters),
+            ', '.join(f'`{name}`' for name in kind.options),
+            kind.traits.formula,
+            ', '.join(sorted(kind.needs)),
+            'yes' if issubclass(kind, MemoryEffect) else 'no',
+            _exact(kind),
+        )
+        for kind in kinds
+    ]
+
+
+def _exact(kind: type[Effect]) -> str:
+    """Return which parameters have an exact derivative."""
+    without = [f'`{p.name}`' for p in kind.parameters if not p.differentiable]
+    if len(without) == len(kind.parameters):
+        return 'none'
+    return 'all but ' + ', '.join(without) if without else 'all'
 
 
 def range_rows(*, sliding: bool) -> list[tuple[str, ...]]:

@@ -3,6 +3,7 @@
 """The page on effects lists what the registry has, and its example runs."""
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,48 +11,57 @@ import pytest
 import yaml
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import REGISTRY, Effect, JointOffset, MemoryEffect, effects_from_list
+from weld_twin_core.effects import REGISTRY, Effect, JointOffset, effects_from_list
+from weld_twin_core.effects.apart import ELSE, way
 from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
 from weld_twin_core.twin.twin import Twin
 
-PAGE = (Path(__file__).parents[2] / 'docs' / 'effects.md').read_text(encoding='utf-8')
-COLUMNS = ('of', 'parameters', 'options', 'definition', 'needs', 'memory', 'derivative')
+DOCS = Path(__file__).parents[2] / 'docs'
+sys.path.append(str(DOCS / '_ext'))
 
+from range_rows import effect_rows  # noqa: E402
 
-def rows():
-    """Return the cells of the table by effect."""
-    out = {}
-    for line in PAGE.splitlines():
-        cells = [cell.strip() for cell in line.strip('|').split('|')]
-        if line.startswith('| `') and len(cells) == len(COLUMNS) + 1:
-            assert cells[0] not in out
-            out[cells[0].strip('`')] = dict(zip(COLUMNS, cells[1:], strict=True))
-    return out
-
-
-ROWS = rows()
+PAGE = (DOCS / 'effects.md').read_text(encoding='utf-8')
 BUNDLED = {k: kind for k, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
+BY_HAND = (
+    '`backlash` | joint | `width` rad | `form` | order | yes | all',
+    '`transmission_ripple` | joint | `amplitude` rad, `order` 1/rev, `phase` rad |  |  | no '
+    '| all but `order`',
+    '`friction` | joint | `windup` rad, `asymmetry` -, `travel` rad | `release` | time, velocity '
+    '| yes | all',
+    '`thermal_growth` | links | `coefficient` 1/K | `reference`, `links`, `warmup` | temperature '
+    '| no | all',
+    '`measurement_noise` | robot | `sigma` m |  |  | no | none',
+)
 
 
-def test_the_page_lists_exactly_the_registered_effects():
-    assert set(ROWS) == set(BUNDLED)
+def test_the_page_has_a_row_for_every_effect_in_the_order_in_which_they_act():
+    assert '```{weld-twin-effects}' in PAGE
+    names = [row[0].strip('`') for row in effect_rows()]
+    assert len(names) == len(set(names)) and set(names) >= set(BUNDLED)
+    order = [names.index(name) for name in ('vibration', 'backlash', 'payload', 'drift')]
+    assert order == sorted(order)
 
 
-@pytest.mark.parametrize('name', BUNDLED)
-def test_the_page_says_what_the_effect_is(name):
-    kind, row = BUNDLED[name], ROWS[name]
-    assert row['of'] == kind.of
-    assert row['parameters'] == ', '.join(f'`{p.name}` {p.unit}' for p in kind.parameters)
-    assert tuple(re.findall(r'`(\w+)`', row['options'])) == kind.options
-    assert set(filter(None, row['needs'].split(', '))) == kind.needs
-    assert row['memory'] == ('yes' if issubclass(kind, MemoryEffect) else 'no')
-    without = [p.name for p in kind.parameters if not p.differentiable]
-    expected = 'all'
-    if without:
-        expected = 'all but ' + ', '.join(f'`{k}`' for k in without)
-    if len(without) == len(kind.parameters):
-        expected = 'none'
-    assert row['derivative'] == expected
+def test_a_row_says_what_the_effect_is():
+    rows = {row[0]: row for row in effect_rows()}
+    for line in BY_HAND:
+        found = rows[line.partition(' ')[0]]
+        assert ' | '.join([*found[:4], *found[5:]]) == line
+
+
+def test_every_effect_tells_its_formula_and_no_other_has_the_same():
+    told = [kind.traits.formula for kind in BUNDLED.values()]
+    assert all(told) and len(set(told)) == len(told)
+
+
+def test_what_parts_two_effects_is_told_of_effects_that_are_there():
+    others = {other for kind in BUNDLED.values() for other in kind.traits.apart}
+    assert others <= set(BUNDLED)
+    words = way(['base_pose', 'tool_pose'])
+    assert words == way(['tool_pose', 'base_pose']) == 'measure the tool by itself'
+    assert way(['link_offset', 'link_offset']).startswith('only their sum moves the tool')
+    assert way(['base_pose', 'base_pose']) == way(['drift', 'wear']) == ELSE
 
 
 def hooks():

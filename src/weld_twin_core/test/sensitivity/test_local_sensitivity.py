@@ -25,6 +25,7 @@ POINTWISE = tuple(
     and name not in ('quantization', 'joint_coupling', 'thermal_growth', 'bearing_tilt')
     and not kind.needs
     and name not in ('root_pose', 'guide_bend', 'guide_tilt')  # of other robots than these arms
+    and all(p.lower < 0.0 for p in kind.parameters)  # else a nominal arm has no other side
 )
 
 # Arms that differ in kind; more of a kind would only repeat them.

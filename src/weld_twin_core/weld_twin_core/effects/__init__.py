@@ -107,5 +107,7 @@ __all__ = [
     'register',
 ]
 
-for _file in iter_modules(__path__):  # a line above only makes a class importable from here
+for _file in iter_modules(__path__):
     import_module(f'.{_file.name}', __name__)
+globals().update({_kind.__name__: _kind for _kind in REGISTRY.values()})
+# A line above tells editors and type checkers of a class; without one it is here as well.

@@ -79,6 +79,7 @@ class Backlash(MemoryEffect):
     traits = Traits(
         title='backlash',
         meaning='a gap in a gear (play): at every reversal the motor crosses it, and the arm stays',
+        formula='w_k = min(θ_k + width/2, max(θ_k − width/2, w_{k−1})), w_0 = θ_0',
         entered="the joint's gear",
         depends_on='direction',
         changes_in_use=True,
@@ -213,6 +214,8 @@ class LoadedPlay(LinearEffect):
     traits = Traits(
         title='play under load',
         meaning='play whose side the load decides',
+        formula='θ → θ + width/2 · τ / √(τ² + torque²), τ the load torque: the flank that the '
+        'load pulls to',
         entered="the joint's gear",
         depends_on='load',
         common=False,

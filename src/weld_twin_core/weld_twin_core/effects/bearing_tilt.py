@@ -71,6 +71,9 @@ class BearingTilt(LinearEffect):
     traits = Traits(
         title='axis wobble',
         meaning='an axis leans as it turns, once or twice per turn',
+        formula='the frame in which the joint turns leans about its x by lean₀ cos θ + lean₁ '
+        'sin θ, about its y by lean₂ cos θ + lean₃ sin θ; `second`, four numbers or '
+        'none, adds the same with 2 θ',
         entered='program',
         depends_on='angle',
         common=False,

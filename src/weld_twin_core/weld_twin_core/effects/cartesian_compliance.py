@@ -26,6 +26,7 @@ class CartesianCompliance(LinearEffect):
     traits = Traits(
         title='compliance at the tool',
         meaning='the tool gives way under a force',
+        formula='p → p + R_tool diag(compliance) R_toolᵀ F',
         entered='stiffness and of the force at the tool',
         depends_on='load',
         place='tool',

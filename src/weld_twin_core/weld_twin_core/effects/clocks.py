@@ -21,6 +21,11 @@ class TimeDelay(Effect):
     traits = Traits(
         title='clock delay',
         meaning='the measurements are stamped too late, or too early, by a constant time',
+        formula='a measurement stamped t shows the robot at t − delay',
+        apart={
+            'servo_lag': 'record commanded and measured joints side by side, or trigger both recordings '
+            'with one signal',
+        },
         entered='its clocks',
         depends_on='speed',
         place='clock',
@@ -67,6 +72,8 @@ class ClockRate(Effect):
     traits = Traits(
         title='clock that runs fast or slow',
         meaning='the two clocks drift apart',
+        formula='a measurement stamped t shows the robot at t − rate (t − t_first): its clock '
+        'runs fast against that of the joints',
         entered='its clocks',
         depends_on='time',
         place='clock',

@@ -193,7 +193,16 @@ class JointCurve(Effect):
 
     name = 'joint_curve'
     traits = Traits(
-        title='measured curve', entered='program', cause=False, by_motion=True, bends=True
+        title='measured curve',
+        entered='program',
+        cause=False,
+        by_motion=True,
+        bends=True,
+        formula='θ → θ + s(x), s the natural cubic spline through `values` at `knots` and '
+        "constant beyond them; x is the joint's `angle`, `direction` (−1 to 1), "
+        '`speed`, `load` torque, the `temperature` or the `time` since the first stamp,'
+        ' or `constant` (one knot); on `channel` `d`, `a`, `alpha`, `beta` of the '
+        "joint's row in place of the joint",
     )
     of = 'joint'
     stage = Stage.LINK
@@ -259,7 +268,14 @@ class FrameCurve(Effect):
     frame: str = 'base'
 
     name = 'frame_curve'
-    traits = Traits(title='measured motion', entered='program', depends_on='time', cause=False)
+    traits = Traits(
+        title='measured motion',
+        entered='program',
+        depends_on='time',
+        cause=False,
+        formula='like `base_pose` or `tool_pose` (`frame`), each component a spline over `time` or '
+        '`temperature`; all knots of x first, then of y and z',
+    )
     of = 'robot'
     stage = Stage.LINK
     parameters = (

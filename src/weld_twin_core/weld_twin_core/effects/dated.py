@@ -100,6 +100,8 @@ class JointSlip(Sudden, ChannelError):
         Sudden.traits,
         title='slip',
         meaning='a joint slipped at one instant, as by a tooth of a belt',
+        formula='like `joint_offset`, from the instant `time` on; a cause only where the checks'
+        ' of the data found the instant',
         entered='zero',
     )
     of = 'joint'
@@ -142,6 +144,8 @@ class ToolSlip(_SuddenFrame):
         _SuddenFrame.traits,
         title='slipped tool or reflector',
         meaning='tool or reflector moved on the flange at one instant',
+        formula='like `tool_pose`, from the instant `time` on; a cause only where the checks of'
+        ' the data found the instant',
         entered='tool',
         place='tool',
     )
@@ -168,6 +172,8 @@ class InstrumentKnock(_SuddenFrame):
         _SuddenFrame.traits,
         title='knocked instrument or base',
         meaning='instrument or base was moved at one instant',
+        formula='like `base_pose`, from the instant `time` on; a cause only where the checks of'
+        ' the data found the instant',
         entered='the instrument or the base was knocked',
         place='instrument',
     )
@@ -198,7 +204,13 @@ class SetupStep(_SetupMotion):
     time: float = 0.0
 
     name = 'setup_step'
-    traits = replace(_SetupMotion.traits, title='moved set-up', entered='base')
+    traits = replace(
+        _SetupMotion.traits,
+        title='moved set-up',
+        entered='base',
+        formula='like `base_pose`, before the instant `time` only; nuisance of a set-up, never '
+        'named as a cause',
+    )
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.1, 'derived: a knock'),
         Plausible.even(5e-3, 0.1, 'derived: a knock'),
@@ -232,7 +244,11 @@ class SetupSettling(_SetupMotion):
 
     name = 'setup_settling'
     traits = replace(
-        _SetupMotion.traits, title='settling set-up', entered='how the set-up is held'
+        _SetupMotion.traits,
+        title='settling set-up',
+        entered='how the set-up is held',
+        formula='like `base_pose`, times exp(−(t − start) / time_constant) after `start`; '
+        'nuisance of a set-up, never named as a cause',
     )
     parameters = frame_parameters(
         Plausible.even(1e-3, 2e-2, 'derived: what a stand creeps while it warms'),

@@ -23,6 +23,10 @@ class Drift(LinearEffect):
     traits = Traits(
         title='drift of the frame',
         meaning='everything measured creeps with time',
+        formula='p → p + xyz_rate (t − t_first)',
+        apart={
+            'thermal_growth': 'measure a fixed point beside the arm while it works',
+        },
         entered='what the frame stands on, or of the temperature',
         depends_on='time',
         place='base',

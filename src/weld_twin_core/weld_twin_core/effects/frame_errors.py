@@ -62,6 +62,7 @@ class BasePose(FrameError):
         FrameError.traits,
         title='base pose error',
         meaning='the robot stands elsewhere than its base frame says',
+        formula='R → exp(rotvec) R, origin → origin + xyz, world axes',
         entered='base',
         place='base',
         fitted_with='base',
@@ -109,6 +110,10 @@ class ToolPose(FrameError):
         FrameError.traits,
         title='tool pose error',
         meaning='the tool is not where its tool frame says',
+        formula='R → R exp(rotvec), origin → origin + xyz, flange axes',
+        apart={
+            'base_pose': 'measure the tool by itself',
+        },
         entered='tool',
         place='tool',
         changes_in_use=True,
@@ -146,6 +151,12 @@ class RootPose(FrameError):
         FrameError.traits,
         title='root error of the positioner',
         meaning='the positioner stands elsewhere than its root frame says',
+        formula="the positioner's foot in the robot's base: R → exp(rotvec) R, origin → origin "
+        "+ xyz, axes of the base of the robot's rows; of a cell with a positioner",
+        apart={
+            'joint_offset': 'measure where the positioner stands beside the robot (points on both '
+            'feet), or master the joint with its own gauge',
+        },
         entered='root',
         depends_on='constant',
         place='base',

@@ -49,6 +49,7 @@ class GearRatio(LinearEffect):
     traits = Traits(
         title='gear ratio error',
         meaning='a joint turns by a constant factor too far',
+        formula='θ → (1 + scale) θ',
         entered='ratio',
         depends_on='angle',
         demand=1,
@@ -106,6 +107,8 @@ class GearRatioByDirection(MemoryEffect):
     traits = Traits(
         title='gear ratio that differs by direction',
         meaning='the same, with another factor each way',
+        formula='θ → θ + difference/2 · z θ, z = 2 (θ − w) / travel with w the play of width '
+        '`travel`: 1 on the way up, −1 on the way down',
         entered="the joint's gear",
         depends_on='direction',
         common=False,

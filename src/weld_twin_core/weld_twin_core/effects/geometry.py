@@ -71,6 +71,13 @@ class JointOffset(ChannelError):
         ChannelError.traits,
         title='zero offset',
         meaning="a joint's zero is wrong by a constant angle",
+        formula='θ → θ + offset',
+        apart={
+            'base_pose': 'measure where the base stands (points on its foot), or master the joint with '
+            'its own gauge',
+            'tool_pose': 'measure the tool by itself, or master the joint with its own gauge',
+            'joint_offset': 'master one of the joints with its own gauge',
+        },
         entered='zero',
         changes_in_use=True,
         set_at_controller=True,
@@ -114,6 +121,7 @@ class LinkLength(_LinkError):
         _LinkError.traits,
         title='link length error',
         meaning='a length in the model of the robot is wrong',
+        formula='a → a + da',
         changes_in_use=True,
     )
     channel = 'a'
@@ -137,6 +145,10 @@ class LinkOffset(_LinkError):
         _LinkError.traits,
         title='link offset error',
         meaning='an offset along an axis in the model of the robot is wrong',
+        formula='d → d + dd',
+        apart={
+            'link_offset': 'only their sum moves the tool, so mending either mends both',
+        },
     )
     channel = 'd'
     parameters = (
@@ -159,6 +171,7 @@ class LinkTwist(_LinkError):
         _LinkError.traits,
         title='link twist error',
         meaning='an angle between two axes in the model of the robot is wrong',
+        formula='α → α + dalpha',
     )
     channel = 'alpha'
     off = 'the axes are twisted by'
@@ -181,6 +194,7 @@ class AxisParallelism(_LinkError):
         _LinkError.traits,
         title='axis parallelism error',
         meaning='two axes that should be parallel are tilted',
+        formula='β → β + dbeta (Hayati)',
     )
     channel = 'beta'
     off = 'the axes are out of parallel by'

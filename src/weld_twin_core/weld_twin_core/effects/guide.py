@@ -81,6 +81,8 @@ class GuideTilt(_GuideError):
         _GuideError.traits,
         title='tilting carriage',
         meaning='the carriage of a joint that slides turns on its way',
+        formula='that carriage turns by rate · q about x, y and z of its row, about its own '
+        'origin',
         entered='program',
     )
     stage = Stage.POSE
@@ -115,6 +117,8 @@ class GuideBend(_GuideError):
         _GuideError.traits,
         title='bent guide',
         meaning='the guide of a joint that slides is no straight line',
+        formula='the carriage of a joint that slides is off by curvature · q² / 2 along the x '
+        'and y of its row',
         entered='program',
     )
     stage = Stage.POSE

@@ -12,7 +12,8 @@ ask knows any effect by name. The page of effects lists all in a table.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -44,6 +45,11 @@ class Traits:
     """What people call it; left out, its name with spaces."""
     meaning: str = ''
     """What is wrong with a machine that has it: half a sentence in plain words."""
+    formula: str = ''
+    """What it does to the channels, as the page of effects lists it."""
+    apart: Mapping[str, str] = field(default_factory=dict)
+    """What parts it from an effect that moves the tool alike on every motion, by the other's name;
+    by its own where two of it do."""
     entered: str = ''
     """Which field of a controller takes a correction of it: 'zero', 'base', 'root', 'tool', 'load',
     'model' or 'ratio'; 'program' where none does and the points of a program can be corrected. Else

@@ -44,6 +44,11 @@ class HosePull(Effect):
     traits = Traits(
         title='pull of the hose package',
         meaning='the hoses pull at the flange',
+        formula='τ → τ + torque of a pull at the flange, force − stiffness · p, p the flange in'
+        ' the base frame',
+        apart={
+            'payload': 'take the hose package off the flange, or weigh what hangs on it',
+        },
         entered='program',
         depends_on='load',
         place='load',

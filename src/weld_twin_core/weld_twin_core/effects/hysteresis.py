@@ -63,6 +63,7 @@ class Hysteresis(MemoryEffect):
     traits = Traits(
         title='hysteresis',
         meaning='a joint stays behind where it came from, more the farther it came',
+        formula='θ → θ − amplitude z, dz/dθ = (1 − z sign θ̇) / travel, z = 0 at first',
         entered="the joint's gear",
         depends_on='direction',
         changes_in_use=True,

@@ -65,6 +65,8 @@ class JointCompliance(LinearEffect):
     traits = Traits(
         title='compliance',
         meaning='a joint gives way under load, like a spring',
+        formula='q = θ + compliance τ(q), τ the load torque of links, payload and wrench where '
+        'the springs have settled; with `statics: effort`, what the controller measured',
         entered='program',
         depends_on='load',
         changes_in_use=True,

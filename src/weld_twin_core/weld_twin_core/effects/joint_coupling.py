@@ -38,6 +38,7 @@ class JointCoupling(LinearEffect):
     traits = Traits(
         title='coupling',
         meaning='turning one joint turns another a little',
+        formula='θ → θ + ratio θ_source',
         entered='ratio',
         depends_on='angle',
         demand=2,

@@ -32,6 +32,10 @@ class MeasurementScale(LinearEffect):
     traits = Traits(
         title='scale error of the instrument',
         meaning="the instrument's millimetre is too long or too short",
+        formula="p → (1 + scale) p, about the world's origin",
+        apart={
+            'link_length': 'measure a bar of known length',
+        },
         entered='the scale of the instrument',
         depends_on='place',
         place='instrument',
@@ -65,7 +69,13 @@ class MeasurementNoise(Effect):
     sigma: Value = 0.0
 
     name = 'measurement_noise'
-    traits = Traits(depends_on='constant', place='instrument', cause=False)
+    traits = Traits(
+        depends_on='constant',
+        place='instrument',
+        cause=False,
+        formula='white noise on every coordinate of the measured position; the floor, never a '
+        'cause',
+    )
     of = 'robot'
     stage = Stage.NOISE
     parameters = (Parameter('sigma', 'm', typical=2e-5, lower=0.0, differentiable=False),)

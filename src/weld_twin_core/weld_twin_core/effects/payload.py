@@ -54,6 +54,10 @@ class Payload(Effect):
     traits = Traits(
         title='wrong payload',
         meaning='the load at the flange is not what was declared',
+        formula='τ → τ + torque of mass at com of the tool, on top of the declared payload',
+        apart={
+            'joint_compliance': 'weigh what hangs on the flange',
+        },
         entered='load',
         depends_on='load',
         place='load',

@@ -41,6 +41,11 @@ class PedestalTilt(LinearEffect):
     traits = Traits(
         title='leaning pedestal',
         meaning="the pedestal under the robot bends under the arm's weight",
+        formula='the base leans about its x and y by compliance · moment about each, the moment'
+        ' of links, declared payload and wrench about its origin',
+        apart={
+            'joint_compliance': 'put a level or a dial gauge on the base while the arm moves',
+        },
         entered='program',
         depends_on='load',
         place='base',

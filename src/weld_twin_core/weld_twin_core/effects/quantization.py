@@ -73,6 +73,7 @@ class Quantization(Effect):
     traits = Traits(
         title='encoder resolution',
         meaning='a joint is read in steps',
+        formula='θ → step · round(θ / step)',
         entered='the encoder',
         depends_on='angle',
         common=False,

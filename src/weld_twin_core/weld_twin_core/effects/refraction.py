@@ -56,6 +56,11 @@ class Refraction(LinearEffect):
     traits = Traits(
         title='bent line of sight',
         meaning='warm air bends the beam of the instrument',
+        formula='p → p + κ (r·r warming / 2 − (warming·r) r), r from the instrument (the '
+        "world's origin) to p, κ = 9.27e-7 1/K for air",
+        apart={
+            'base_pose': 'measure from a second place of the instrument',
+        },
         entered='warm air bent the line of sight',
         depends_on='place',
         place='instrument',

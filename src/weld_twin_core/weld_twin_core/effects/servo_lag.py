@@ -84,6 +84,8 @@ class ServoLag(MemoryEffect):
     traits = Traits(
         title='servo lag',
         meaning='the drive trails behind its command',
+        formula='τ ẏ + y = θ, exact for a command straight between samples; with `damping` ζ a '
+        'loop that swings, ÿ / ω² + τ ẏ + y = θ, ω = 2 ζ / τ',
         entered="the drive's gains and feed-forward",
         depends_on='speed',
     )

@@ -45,6 +45,8 @@ class ThermalGrowth(LinearEffect):
     traits = Traits(
         title='thermal growth',
         meaning='the links grow with temperature',
+        formula='a, d → (1 + coefficient ΔT) a, d; ΔT = temperature − reference (20 °C), or '
+        'rise (1 − exp(−t / time constant)) with `warmup: [rise, time constant]`',
         entered='warming up, or of the temperature in the cell',
         depends_on='temperature',
         demand=1,
@@ -147,6 +149,8 @@ class LinkWarmUp(Effect):
     traits = Traits(
         title='warm-up of the link',
         meaning='one link grows as it warms up',
+        formula='a, d → (1 + strain w) a, d of one row, w = 1 − exp(−t / warming_time) since '
+        'the first stamp; with `follows: [at, rise]` w = (temperature − at) / rise',
         entered='warming up',
         depends_on='time',
         common=False,

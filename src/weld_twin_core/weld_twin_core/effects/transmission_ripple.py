@@ -123,6 +123,8 @@ class TransmissionRipple(Effect):
     traits = Traits(
         title='transmission ripple',
         meaning='a gear turns unevenly, in waves over its turn',
+        formula='θ → θ + Σ amplitude sin(order θ + phase); numbers, or lists with one entry per'
+        ' order',
         entered='program',
         depends_on='angle',
         demand=1,

@@ -69,6 +69,7 @@ class Vibration(MemoryEffect):
     traits = Traits(
         title='vibration',
         meaning='a joint swings after it was accelerated',
+        formula='ẍ + 2 damping ω ẋ + ω² x = −gain θ̈, ω = 2π frequency; θ → θ + x',
         entered='how the motion is planned, and of stiffness',
         depends_on='acceleration',
     )

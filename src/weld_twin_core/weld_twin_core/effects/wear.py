@@ -38,6 +38,8 @@ class Wear(Effect):
     traits = Traits(
         title='tool wear',
         meaning='the tip of the tool wears away',
+        formula='tool centre point → tool centre point − rate log(1 + slowing (t − t_first)) / '
+        "slowing along the tool's z, − rate (t − t_first) where slowing is 0",
         entered='tool',
         depends_on='time',
         place='tool',

@@ -141,7 +141,10 @@ def _effect(kind: type[Effect]) -> Schema:
             keys[item.name] = _said(keys[item.name], f'[{parameter.unit}]')
         if item.default is MISSING and item.default_factory is MISSING:
             required.append(item.name)
-    return _object(keys, tuple(required)) | {'title': kind.name}
+    return _object(keys, tuple(required)) | {
+        'title': kind.name,
+        'description': kind.traits.formula,
+    }
 
 
 def _bounded(lower: float, upper: float) -> Schema:

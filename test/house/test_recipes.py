@@ -1,0 +1,137 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The recipes of CONTRIBUTING: files dropped into a copy of the tree work without a line elsewhere."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EFFECT = '''
+    """The neck of the torch bends under its own weight, by what of it is across the neck."""
+
+    import numpy as np
+
+    from .effect import LinearEffect
+    from .hooks import Traits
+    from .registry import register
+    from .view import Parameter, Stage, Value
+    from .wording import size
+
+
+    @register
+    class TorchSag(LinearEffect):
+        """The tool centre point hangs by ``droop`` where the tool's z axis is level."""
+
+        droop: Value = 0.0
+
+        name = 'torch_sag'
+        of = 'robot'
+        stage = Stage.POSE
+        traits = Traits(
+            title='sagging torch',
+            meaning='the neck of the torch bends under its own weight',
+            formula='p → p + droop · (down − (down · z) z), z along the tool',
+            apart={'cartesian_compliance': 'hang a weight on the torch'},
+            entered='program',
+            depends_on='load',
+            place='tool',
+            changes_in_use=True,
+            common=False,
+        )
+        parameters = (
+            Parameter('droop', 'm', typical=2e-4, lower=0.0).plausible(
+                (3e-4, 0.0, 5e-3), 'derived: half a metre of thin tube with 2 kg at its end'
+            ),
+        )
+
+        def per_unit(self, view):
+            gravity = np.asarray(view.robot.gravity)
+            down = view.robot.T_world_base[:3, :3] @ gravity / np.linalg.norm(gravity)
+            along = view.frames.rotation[..., :, 2]
+            across = down - (along @ down)[..., None] * along
+            return [{('pose', k): across[..., k] for k in range(3)}]
+
+        def remedy(self, robot):
+            return f'Stiffen the neck of the torch: it sags by {size(self.droop * 1e3)} mm.'
+'''
+PLANT = '''
+    """The neck as a clamped beam under an even load, summed over pieces of it."""
+
+    import numpy as np
+
+    from .flaws import flaw
+
+
+    @flaw('hand')
+    def torch_sag(entry, here, pose):
+        beyond = 1.0 - (np.arange(40) + 0.5) / 40
+        tip = np.mean(0.5 * beyond**2 * beyond) / 0.125
+        weight = pose.rotation[..., 2, :] * [-1.0, -1.0, 0.0]
+        off = np.einsum('nij,nj->ni', pose.rotation, float(entry['droop']) * tip * weight)
+        return pose._replace(position=pose.position + off)
+'''
+DIAGNOSED = """
+    from types import SimpleNamespace
+    import numpy as np
+    import weld_twin_core as wt
+    from diagnosis_cells import recorded
+    from range_rows import cause_rows, effect_rows
+    from small_arm import small_arm
+    from weld_twin_core.effects.apart import way
+    from weld_twin_lab.blind.cause_sizes import FAMILIES
+    from weld_twin_report.history.words import likely
+    from weld_twin_report.report.diagnosis_page import report_page
+
+    truth = [{'effect': 'torch_sag', 'droop': 6e-4}]
+    held = np.array([[1, 0, 0, 0.1], [0, 0, -1, 0.05], [0, 1, 0, 0.2], [0, 0, 0, 1.0]])
+    arm = small_arm().with_frames(tool=held)  # the torch across the last axis
+    found = wt.diagnose([recorded(arm, truth, static=25)], arm)
+    (one,) = found.effects
+    assert (one.effect.name, found.status) == ('torch_sag', 'identified'), (found.status, found.effects)
+    assert abs(one.effect.droop / 6e-4 - 1.0) < 0.05, one.effect.droop
+    page = report_page(found)
+    assert 'Stiffen the neck of the torch: it sags by 0.' in page
+    assert 'sagging torch' in page and 'bends under its own weight' in page
+    assert wt.effects.TorchSag is type(one.effect)
+    assert 'torch_sag' in FAMILIES
+    past = [SimpleNamespace(names=('torch_sag droop', 'drift xyz_rate'))]
+    assert likely(past) == {'torch_sag droop'}
+    assert way(['cartesian_compliance', 'torch_sag']) == 'hang a weight on the torch'
+    assert '`torch_sag`' in [row[0] for row in effect_rows()]
+    assert 'sagging torch' in [title for title, _ in cause_rows()]
+"""
+
+
+@pytest.fixture(scope='module')
+def tree(tmp_path_factory):
+    """Return a copy of all packages, side by side."""
+    out = tmp_path_factory.mktemp('copy')
+    for package in (ROOT / 'src').glob('weld_twin*'):
+        shutil.copytree(
+            package / package.name,
+            out / package.name,
+            ignore=shutil.ignore_patterns('__pycache__'),
+        )
+    return out
+
+
+def run(tree, code, *beside):
+    """Run code where the packages of a copy are found first, and some folders of this tree."""
+    places = [str(tree), *(str(ROOT / folder) for folder in beside)]
+    start = f'import sys; sys.path[:0] = {places!r}\n'
+    done = subprocess.run(
+        [sys.executable, '-c', start + dedent(code)], capture_output=True, text=True, cwd=tree
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_an_effect_and_its_plant_are_a_file_each_and_a_diagnosis_names_it(tree):
+    pytest.importorskip('mujoco')
+    (tree / 'weld_twin_core/effects/torch_sag.py').write_text(dedent(EFFECT), encoding='utf-8')
+    (tree / 'weld_twin_lab/plant/torch_neck.py').write_text(dedent(PLANT), encoding='utf-8')
+    run(tree, DIAGNOSED, 'test/diagnosis', 'src/weld_twin_core/test', 'docs/_ext')

@@ -17,7 +17,7 @@ from weld_twin_core.effects.registry import effects_from_list
 from weld_twin_core.recording import Recording
 
 from ..blind import layout
-from ..blind.achieved import aligned_on, counted, gap_on
+from ..blind.achieved import counted, gap_on, nominal_on
 from ..blind.blind_cell import Take, as_recording, floor, record
 from ..blind.cause_sizes import Cause
 from ..blind.displacement import rms
@@ -137,11 +137,8 @@ def _sealed(case: SealedCase, truth: dict[str, Any], diagnosis: Diagnosis) -> di
         return {}
     test = _recorded(case, layout.TEST)
     good = counted(test, truth['outliers'])
-    robot = case.cell.robot
-    bare = Model(robot, (robot.T_world_base,), diagnosis.model.known)
-    if case.cell.align:
-        train = _recorded(case, layout.TRAIN)
-        bare = aligned_on(bare, train, list(case.cell.align))
+    cell, train = case.cell, _recorded(case, layout.TRAIN)
+    bare = nominal_on(cell.robot, diagnosis.model.known, train, cell.align)
 
     def remaining(model: Model) -> float:
         return rms(gap_on(model, test)[good])

@@ -4,11 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
 from weld_twin_core.diagnosis.frames.alignment import initial_frames, refined
+from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
 
@@ -18,12 +22,17 @@ TO_90 = NORMAL_90 / 1.959963984540054
 """Half-width of a normal 90 % interval over that of a 95 % one."""
 
 
-def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:
+def nominal_on(
+    robot: Robot, known: tuple[Effect, ...], recording: Recording, align: Collection[str]
+) -> Model:
     """
-    Return the model with the frames that a diagnosis of this recording starts from.
+    Return the nominal model with the frames that a diagnosis of this recording starts from.
 
     align: frames that are fitted.
     """
+    model = Model(robot, (robot.T_world_base,), known)
+    if not align:
+        return model
     problem = Problem((usable(recording),), frozenset(align))
     return refined(problem, initial_frames(problem, model))
 

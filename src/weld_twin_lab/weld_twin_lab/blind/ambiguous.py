@@ -9,6 +9,7 @@ Each construction gives the causes at work and every answer that is as right as 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,10 +36,12 @@ def construct(name: str, robot: Robot, span: float, rng: np.random.Generator) ->
     return CONSTRUCTIONS[name](robot, span, rng)
 
 
-def _first_axis(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
-    """Turn the first joint; a base turned about its axis is the same."""
-    cause = _on('joint_offset', robot, 0, span, rng)
-    return Construction([cause], [[('base_pose', None)]])
+def _at_an_end(
+    family: str, at: int, frame: str, robot: Robot, span: float, rng: np.random.Generator
+) -> Construction:
+    """Turn or raise the first or last joint; a frame turned about or moved along it is the same."""
+    cause = {**draw(family, robot, span, rng), 'joint': robot.joint_names[at]}
+    return Construction([cause], [[(frame, None)]])
 
 
 def _base_turn(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
@@ -56,10 +59,10 @@ def _parallel(robot: Robot, span: float, rng: np.random.Generator) -> Constructi
     for at in rng.permutation(robot.n):
         mates = [k for k in range(robot.n) if k != at and _linked(axes, at, k)]
         if mates:
-            cause = _on('link_offset', robot, int(at), span, rng)
+            cause = {**draw('link_offset', robot, span, rng), 'joint': robot.joint_names[at]}
             alike: list[list[Site]] = [[('link_offset', robot.joint_names[k])] for k in mates]
             return Construction([cause], alike)
-    return _first_axis(robot, span, rng)
+    return construct('first axis', robot, span, rng)
 
 
 def _lag_on_every_joint(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
@@ -71,30 +74,14 @@ def _lag_on_every_joint(robot: Robot, span: float, rng: np.random.Generator) -> 
     return Construction(causes, [[('time_delay', None)]])
 
 
-def _last_axis(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
-    """Turn the last joint; a tool turned about its axis is the same."""
-    cause = _on('joint_offset', robot, robot.n - 1, span, rng)
-    return Construction([cause], [[('tool_pose', None)]])
-
-
-def _pedestal(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
-    """Raise the first link; a base moved along its axis is the same."""
-    cause = _on('link_offset', robot, 0, span, rng)
-    return Construction([cause], [[('base_pose', None)]])
-
-
 CONSTRUCTIONS: dict[str, Callable[..., Construction]] = {
-    'first axis': _first_axis,
+    'first axis': partial(_at_an_end, 'joint_offset', 0, 'base_pose'),
     'base turn': _base_turn,
     'parallel axes': _parallel,
     'equal lag': _lag_on_every_joint,
-    'last axis': _last_axis,
-    'pedestal': _pedestal,
+    'last axis': partial(_at_an_end, 'joint_offset', -1, 'tool_pose'),
+    'pedestal': partial(_at_an_end, 'link_offset', 0, 'base_pose'),
 }
-
-
-def _on(family: str, robot: Robot, at: int, span: float, rng: np.random.Generator) -> Cause:
-    return {**draw(family, robot, span, rng), 'joint': robot.joint_names[at]}
 
 
 def _turned(point: np.ndarray, turn: np.ndarray) -> np.ndarray:

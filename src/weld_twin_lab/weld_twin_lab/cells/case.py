@@ -21,7 +21,7 @@ from ..blind.cause_sizes import AT_REST, Cause, draw, plausible, scaled, site
 from ..blind.displacement import rms
 from ..plant.camera import Eye, looking, seen
 from ..plant.screws import Motion, compose, exp_screw
-from .drawn import cell, postures, really
+from .drawn import SWING, cell, postures, really
 
 SLIDES = ('gear_ratio',)
 """Those that a track has in the plant."""
@@ -57,23 +57,13 @@ def sealed(kind: str, seed: int) -> CellResult:
     seed: decides arms, postures, cause and size.
     """
     rng = np.random.default_rng([seed, len(kind)])
-    data = cell(kind, seed)
-    robot = Robot.from_mapping(data)
-    q = postures(robot, STATIONS, rng)
-
-    def truly(causes: list[Cause]) -> Motion:
-        return really(data, robot.joint_names, causes, q, np.random.default_rng(seed))
-
+    robot, q, truly = _drawn(kind, seed, rng, SWING)
     cause, shown = _cause(robot, truly, np.sqrt(3.0) * SIGMA, rng)
     tool = truly([cause])
     turned = exp_screw_about(rng.normal(0.0, TURN, (STATIONS, 3))) @ tool.rotation
     place = tool.position + rng.normal(0.0, SIGMA, (STATIONS, 3))
-    diagnosis = diagnose(
-        _recording(q, Measurements(_t(q), place, turned)), robot, align=FRAMES, experiment=False
-    )
-    return {'kind': kind, 'seed': seed, 'robot': robot.name, 'noises': shown} | opened(
-        diagnosis, site(cause)
-    )
+    told = _told(robot, _recording(q, Measurements(_t(q), place, turned)), cause)
+    return {'kind': kind, 'seed': seed, 'robot': robot.name, 'noises': shown, **told}
 
 
 FRAMES = ('base', 'tool')
@@ -82,13 +72,7 @@ FRAMES = ('base', 'tool')
 def beside_a_camera(seed: int) -> CellResult:
     """Return what pixels of two cameras, and a tracker at the same stations, tell of one cause."""
     rng = np.random.default_rng([seed, 77])
-    data = cell('arm', seed)
-    robot = Robot.from_mapping(data)
-    q = postures(robot, STATIONS, rng, NEAR)
-
-    def truly(causes: list[Cause]) -> Motion:
-        return really(data, robot.joint_names, causes, q, np.random.default_rng(seed))
-
+    robot, q, truly = _drawn('arm', seed, rng, NEAR)
     eyes = _eyes(compose(truly([]), ON_TOOL), rng)
     first = seen_by(_recording(q, None), _sightings(eyes, compose(truly([]), ON_TOOL), rng))
     assert first.measured is not None and first.measured.noise is not None
@@ -105,14 +89,29 @@ def beside_a_camera(seed: int) -> CellResult:
         'noises': shown,
         'noise_m': noise,
         'images': kept,
-        'pixels': opened(diagnose(pixels, robot, align=FRAMES, experiment=False), site(cause)),
-        'tracker': opened(
-            diagnose(
-                _recording(q, Measurements(_t(q), place)), robot, align=FRAMES, experiment=False
-            ),
-            site(cause),
-        ),
+        'pixels': _told(robot, pixels, cause),
+        'tracker': _told(robot, _recording(q, Measurements(_t(q), place)), cause),
     }
+
+
+Truly = Callable[[list[Cause]], Motion]
+"""Gives the torch as the plant has it with some causes."""
+
+
+def _drawn(
+    kind: str, seed: int, rng: np.random.Generator, swing: float
+) -> tuple[Robot, Array, Truly]:
+    """Return a cell, its postures, and where its torch really is there."""
+    data = cell(kind, seed)
+    robot = Robot.from_mapping(data)
+    q = postures(robot, STATIONS, rng, swing)
+    names = robot.joint_names
+    return robot, q, lambda causes: really(data, names, causes, q, np.random.default_rng(seed))
+
+
+def _told(robot: Robot, recording: Recording, cause: Cause) -> CellResult:
+    """Return what is told of a recording with both frames open, beside the truth."""
+    return opened(diagnose(recording, robot, align=FRAMES, experiment=False), site(cause))
 
 
 def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> CellResult:
@@ -132,7 +131,7 @@ def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> CellResult:
 
 
 def _cause(
-    robot: Robot, truly: Callable[[list[Cause]], Motion], noise: float, rng: np.random.Generator
+    robot: Robot, truly: Truly, noise: float, rng: np.random.Generator
 ) -> tuple[Cause, float]:
     """Return a cause that moves the tool by a size drawn in noises, and that size."""
     plain = truly([])

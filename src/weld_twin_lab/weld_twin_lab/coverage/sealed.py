@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.diagnosis import Diagnosis
-from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
@@ -30,7 +29,7 @@ from weld_twin_core.twin.twin import Twin
 from ..belief.mix import drawn
 from ..belief.trial import diagnosed, recordings_of
 from ..belief.visible import true_shares
-from ..blind.achieved import NORMAL_90, TO_90, aligned_on, gap_on
+from ..blind.achieved import NORMAL_90, TO_90, gap_on, nominal_on
 from ..blind.blind_cell import GROSS, as_recording, exact, record
 from ..blind.cause_sizes import Cause, site
 from ..blind.displacement import rms
@@ -192,10 +191,7 @@ def _of_shrink(
     assert test.measured is not None
     assert found.shrink is not None
     assert found.posterior is not None
-    robot = case.cell.robot
-    bare = Model(robot, (robot.T_world_base,), found.model.known)
-    if case.cell.align:
-        bare = aligned_on(bare, train, list(case.cell.align))
+    bare = nominal_on(case.cell.robot, found.model.known, train, case.cell.align)
     before, after = (np.linalg.norm(gap_on(m, test), axis=1) for m in (bare, found.model))
     # An instrument's outliers are nobody's shrink.
     good = within(test, test.measured) & (after < GROSS * np.median(after))

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -169,17 +169,13 @@ def moved(events: Sequence[Event], week: int) -> dict[str, float]:
     return out
 
 
-CAUSES: dict[str, Callable[[str, float], dict[str, object]]] = {
-    'joint_offset': lambda joint, v: {'effect': 'joint_offset', 'joint': joint, 'offset': v},
-    'link_length': lambda joint, v: {'effect': 'link_length', 'joint': joint, 'da': v},
-    'backlash': lambda joint, v: {'effect': 'backlash', 'joint': joint, 'width': v},
-    'joint_compliance': lambda joint, v: {
-        'effect': 'joint_compliance',
-        'joint': joint,
-        'compliance': v,
-    },
+SIZES = {
+    'joint_offset': 'offset',
+    'link_length': 'da',
+    'backlash': 'width',
+    'joint_compliance': 'compliance',
 }
-"""How a coordinate is told to the plant."""
+"""What the plant calls the coordinate of an effect."""
 
 
 def cause(name: str, value: float) -> dict[str, object]:
@@ -189,4 +185,4 @@ def cause(name: str, value: float) -> dict[str, object]:
         xyz = [value if k == axis else 0.0 for k in range(3)]
         return {'effect': 'tool_pose', 'xyz': xyz, 'rotvec': [0.0, 0.0, 0.0]}
     family, joint, _ = name.split(' ')
-    return CAUSES[family](joint, value)
+    return {'effect': family, 'joint': joint, SIZES[family]: value}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -56,6 +57,12 @@ def _seen(recording: Recording) -> Measurements:
     return recording.measured
 
 
+def _measured(sound: Sound, said: str, **changes: Any) -> Made:
+    """Return the recording with something else measured."""
+    made = replace(_seen(sound.recording), **changes)
+    return sound.robot, sound.recording.with_measured(made), said
+
+
 def _with_q(recording: Recording, q: Array, qd: Array | None = None) -> Recording:
     return replace(recording, joints=replace(recording.joints, q=q, qd=qd))
 
@@ -89,7 +96,7 @@ def units(sound: Sound, rng: np.random.Generator) -> Made:
     """
     whole = [] if sound.recording.joints.static else ['degrees', 'millimetres']
     what = str(rng.choice([*whole, 'one joint', 'one axis']))
-    recording, n = sound.recording, sound.robot.n
+    n = sound.robot.n
     if what == 'degrees':
         return sound.robot, _matrix(sound, np.degrees(1.0) * np.eye(n)), what
     if what == 'one joint':
@@ -101,12 +108,7 @@ def units(sound: Sound, rng: np.random.Generator) -> Made:
     if what == 'one axis':
         factor = np.ones(3)
         factor[int(rng.integers(3))] = 1e3
-    seen = _seen(recording)
-    return (
-        sound.robot,
-        recording.with_measured(replace(seen, position=seen.position * factor)),
-        what,
-    )
+    return _measured(sound, what, position=_seen(sound.recording).position * factor)
 
 
 def joints_swapped(sound: Sound, rng: np.random.Generator) -> Made:
@@ -126,9 +128,8 @@ def sign(sound: Sound, rng: np.random.Generator) -> Made:
     if rng.random() < 0.25:
         factor = np.ones(3)
         factor[int(rng.integers(3))] = -1.0
-        seen = _seen(sound.recording)
-        made = replace(seen, position=seen.position * factor, rotation=None)
-        return sound.robot, sound.recording.with_measured(made), 'mirror'
+        mirrored = _seen(sound.recording).position * factor
+        return _measured(sound, 'mirror', position=mirrored, rotation=None)
     i = _inner(sound, rng)
     matrix = np.eye(sound.robot.n)
     matrix[i, i] = -1.0
@@ -226,8 +227,7 @@ def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
     q = sound.recording.joints.at(seen.t)[0]
     turns = _frame_of(sound, seen, q) @ forward(sound.real, q)[:, :3, :3]
     position = seen.position + np.where(after[:, None], turns @ way, 0.0)
-    made = sound.recording.with_measured(replace(seen, position=position))
-    return sound.robot, made, f'{size * 1e3:.2f} mm'
+    return _measured(sound, f'{size * 1e3:.2f} mm', position=position)
 
 
 def _frame_of(sound: Sound, seen: Measurements, q: Array) -> Array:
@@ -261,9 +261,8 @@ def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
         before, then = (forward(robot, p)[:, :3, :3] for p in (q, q + slip))
         rotated = turn @ then @ np.swapaxes(before, 1, 2) @ turn.T @ rotation
         rotation = np.where(after[:, None, None], rotated, rotation)
-    made = replace(seen, position=seen.position + moved, rotation=rotation)
     said = f'{robot.joint_names[i]} {slip[i] * 1e3:+.2f} mrad'
-    return sound.robot, sound.recording.with_measured(made), said
+    return _measured(sound, said, position=seen.position + moved, rotation=rotation)
 
 
 def _tip(robot: Robot, q: Array) -> Array:
@@ -284,8 +283,7 @@ def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
     rotation = seen.rotation
     if rotation is not None:
         rotation = np.where(after[:, None, None], R @ rotation, rotation)
-    made = replace(seen, position=position, rotation=rotation)
-    return sound.robot, sound.recording.with_measured(made), f'{size * 1e3:.2f} mm'
+    return _measured(sound, f'{size * 1e3:.2f} mm', position=position, rotation=rotation)
 
 
 def _turning(sound: Sound) -> float:
@@ -331,22 +329,20 @@ def clock(sound: Sound, rng: np.random.Generator) -> Made:
         t, said = seen.t[0] + (seen.t - seen.t[0]) * (1.0 + rate), f'{rate:.2%}'
     else:
         t, said = seen.t + float(rng.uniform(1e3, 1e6)), 'another epoch'
-    return sound.robot, sound.recording.with_measured(replace(seen, t=t)), said
+    return _measured(sound, said, t=t)
 
 
 def other(sound: Sound, rng: np.random.Generator) -> Made:
     """Pair measurements with the wrong rows or motion, or write quaternions in another order."""
     seen = _seen(sound.recording)
     if seen.rotation is not None and rng.random() < 0.5:
-        made = replace(seen, rotation=np.swapaxes(seen.rotation, 1, 2))
-        return sound.robot, sound.recording.with_measured(made), 'orientations inverted'
+        return _measured(sound, 'orientations inverted', rotation=seen.rotation.swapaxes(1, 2))
     if sound.recording.joints.static:
         shift = int(seen.t.size * rng.uniform(0.2, 0.8))
         position, said = np.roll(seen.position, shift, axis=0), f'rows shifted by {shift}'
     else:  # shifted in time it would be another clock
         position, said = seen.position[::-1], 'measured on the way back'
-    made = replace(seen, position=position, rotation=None)
-    return sound.robot, sound.recording.with_measured(made), said
+    return _measured(sound, said, position=position, rotation=None)
 
 
 def computed(sound: Sound, rng: np.random.Generator) -> Made:
@@ -363,8 +359,7 @@ def computed(sound: Sound, rng: np.random.Generator) -> Made:
         own, said = replace(robot, **calibrated), 'calibrated'
     poses = forward(own, q)
     rotation = None if seen.rotation is None else poses[:, :3, :3]
-    made = replace(seen, position=poses[:, :3, 3], rotation=rotation, sigma=None)
-    return robot, sound.recording.with_measured(made), said
+    return _measured(sound, said, position=poses[:, :3, 3], rotation=rotation, sigma=None)
 
 
 def stamps_in_bursts(sound: Sound, rng: np.random.Generator) -> Made:
@@ -376,8 +371,7 @@ def stamps_in_bursts(sound: Sound, rng: np.random.Generator) -> Made:
     if np.quantile(way, 0.75) < BRISK:
         raise Hidden('the arm hardly moves while the buffer fills')
     t = seen.t[last] + SENT * (index - last + size)
-    made = sound.recording.with_measured(replace(seen, t=t))
-    return sound.robot, made, f'{size} at a time'
+    return _measured(sound, f'{size} at a time', t=t)
 
 
 def camera_inverted(sound: Sound, rng: np.random.Generator) -> Made:

@@ -26,35 +26,25 @@ class ProgramCell(NamedTuple):
     robot: str
     suffix: str
     reader: Callable[..., readers.Moves]
+    maker: str = ''
+    """What the bundled robots that the language drives are called."""
 
 
 CELLS: dict[str, ProgramCell] = {
-    'urscript': ProgramCell('ur5', '.script', readers.urscript),
-    'krl': ProgramCell('kuka_kr16_2', '.src', readers.krl),
-    'rapid': ProgramCell('abb_irb1600', '.mod', readers.rapid),
-    'inform': ProgramCell('yaskawa_ma1440', '.jbi', readers.inform),
-    'fanuc-ls': ProgramCell('fanuc_m10ia', '.ls', readers.fanuc),
+    'urscript': ProgramCell('ur5', '.script', readers.urscript, 'ur'),
+    'krl': ProgramCell('kuka_kr16_2', '.src', readers.krl, 'kuka_kr'),
+    'rapid': ProgramCell('abb_irb1600', '.mod', readers.rapid, 'abb'),
+    'inform': ProgramCell('yaskawa_ma1440', '.jbi', readers.inform, 'yaskawa'),
+    'fanuc-ls': ProgramCell('fanuc_m10ia', '.ls', readers.fanuc, 'fanuc'),
     'joint-trajectory': ProgramCell('ur5', '.yaml', readers.trajectory),
     'csv': ProgramCell('ur5', '.csv', readers.table),
 }
 """By language."""
 
 
-MAKERS = {
-    'urscript': 'ur',
-    'krl': 'kuka_kr',
-    'rapid': 'abb',
-    'inform': 'yaskawa',
-    'fanuc-ls': 'fanuc',
-    'joint-trajectory': '',
-    'csv': '',
-}
-"""What the bundled robots that a language drives are called; KUKA's iiwa speaks Java."""
-
-
 def robots_of(language: str) -> list[str]:
-    """Return the bundled robots that a language drives."""
-    return [name for name in names() if name.startswith(MAKERS[language])]
+    """Return the bundled robots that a language drives; KUKA's iiwa speaks Java."""
+    return [name for name in names() if name.startswith(CELLS[language].maker)]
 
 
 def reader_of(language: str, robot: Robot) -> Callable[[readers.Texts], readers.Moves]:

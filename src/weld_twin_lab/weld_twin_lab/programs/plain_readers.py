@@ -97,13 +97,10 @@ def rapid(files: Texts) -> Moves:
                 moved = known[name].copy()
                 moved[:3, 3] += np.array([float(v) for v in shift]) / 1e3
                 places.append(table @ moved)
-            elif item.startswith('['):
-                kind = 'jointtarget' if word == 'MoveAbsJ' else 'robtarget'
-                value = rapid_target(kind, item)
-                places.append(value if value.ndim == 1 else table @ value)
-            else:
-                value = known[item]
-                places.append(value if value.ndim == 1 else table @ value)
+                continue
+            kind = 'jointtarget' if word == 'MoveAbsJ' else 'robtarget'
+            value = rapid_target(kind, item) if item.startswith('[') else known[item]
+            places.append(value if value.ndim == 1 else table @ value)
         out.append((word, places))
     return out
 

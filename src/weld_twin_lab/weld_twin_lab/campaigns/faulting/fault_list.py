@@ -7,6 +7,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,41 +43,32 @@ class Fault:
     """Nodes whose health must not be ok meanwhile."""
 
 
-def _third(spoil: Callable[[Any], None]) -> Callable[[Bench], None]:
-    """Return a fault that spoils every third joint state."""
+def _third(spoil: Callable[[Any], None], bench: Bench) -> None:
+    """Spoil every third joint state."""
 
-    def run(bench: Bench) -> None:
-        def each(k: int) -> None:
-            message = bench.joint_state()
-            if k % 3 == 0:
-                spoil(message)
-            bench.send(message, sound=k % 3 != 0)
+    def each(k: int) -> None:
+        message = bench.joint_state()
+        if k % 3 == 0:
+            spoil(message)
+        bench.send(message, sound=k % 3 != 0)
 
-        bench.run(LONG, each)
-
-    return run
+    bench.run(LONG, each)
 
 
-def _bytes(make: Callable[[bytes, int], bytes]) -> Callable[[Bench], None]:
-    """Return a fault that follows every third joint state with bytes that are none."""
+def _bytes(make: Callable[[bytes, int], bytes], bench: Bench) -> None:
+    """Follow every third joint state with bytes that are none."""
 
-    def run(bench: Bench) -> None:
-        def each(k: int) -> None:
-            message = bench.joint_state()
-            bench.send(message)
-            if k % 3 == 0:
-                bench.send(make(serialize_message(message), k), sound=False)
+    def each(k: int) -> None:
+        message = bench.joint_state()
+        bench.send(message)
+        if k % 3 == 0:
+            bench.send(make(serialize_message(message), k), sound=False)
 
-        bench.run(LONG, each)
-
-    return run
+    bench.run(LONG, each)
 
 
-def _set(field: str, k: int, value: float) -> Callable[[Any], None]:
-    def spoil(message: Any) -> None:
-        getattr(message, field)[k] = value
-
-    return spoil
+def _set(field: str, k: int, value: float, message: Any) -> None:
+    getattr(message, field)[k] = value
 
 
 def _short(message: Any) -> None:
@@ -91,11 +83,8 @@ def _degrees(message: Any) -> None:
     message.position = np.degrees(message.position)
 
 
-def _shifted(ns: int) -> Callable[[Any], None]:
-    def spoil(message: Any) -> None:
-        message.header.stamp.sec += ns // S
-
-    return spoil
+def _shifted(ns: int, message: Any) -> None:
+    message.header.stamp.sec += ns // S
 
 
 def _unset(message: Any) -> None:
@@ -125,58 +114,50 @@ def _future(bench: Bench) -> None:
     def each(k: int) -> None:
         message = bench.joint_state()
         if k % 50 == 10:
-            _shifted(HOUR)(message)
+            _shifted(HOUR, message)
         bench.send(message)
 
     bench.run(LONG, each)
 
 
-def _rate(factor: float) -> Callable[[Bench], None]:
-    return lambda bench: bench.run(LONG + 1.0, rate=RATE * factor)
+def _rate(factor: float, bench: Bench) -> None:
+    bench.run(LONG + 1.0, rate=RATE * factor)
 
 
 def _silence(bench: Bench) -> None:
     bench.rest(LONG + 1.0)
 
 
-def _twice(change: float) -> Callable[[Bench], None]:
-    """Return a fault: another publisher repeats every joint state, or contradicts it between."""
+def _twice(change: float, bench: Bench) -> None:
+    """Let another publisher repeat every joint state, or contradict it between."""
+    second = bench.publisher(JOINT_STATES)
+    bench.cell.wait(lambda: second.get_subscription_count() >= 4, 'listeners')
 
-    def run(bench: Bench) -> None:
-        second = bench.publisher(JOINT_STATES)
-        bench.cell.wait(lambda: second.get_subscription_count() >= 4, 'listeners')
+    def each(_: int) -> None:
+        message = bench.joint_state()
+        bench.send(message)
+        if change:
+            message.header.stamp.nanosec += 1
+            message.position[2] += change
+            bench.sent[bench.stamp + 1].append(np.array(message.position))
+        second.publish(message)
 
-        def each(_: int) -> None:
-            message = bench.joint_state()
-            bench.send(message)
-            if change:
-                message.header.stamp.nanosec += 1
-                message.position[2] += change
-                bench.sent[bench.stamp + 1].append(np.array(message.position))
-            second.publish(message)
-
-        bench.run(LONG, each)
-        bench.cell.node.destroy_publisher(second)
-
-    return run
+    bench.run(LONG, each)
+    bench.cell.node.destroy_publisher(second)
 
 
-def _restart(number: int, order: Sequence[str]) -> Callable[[Bench], None]:
-    """Return a fault: nodes end by a signal and come back in the order given."""
-
-    def run(bench: Bench) -> None:
-        for name in order:
-            process = bench.processes[name]
-            process.signal(number)
-            process.end(60.0)
-            bench.cell.processes.remove(process)
-        bench.run(1.0)
-        for name in order:
-            bench.start(name)
-            bench.run(0.5)
-        bench.ready()
-
-    return run
+def _restart(number: int, order: Sequence[str], bench: Bench) -> None:
+    """End nodes by a signal, and bring them back in the order given."""
+    for name in order:
+        process = bench.processes[name]
+        process.signal(number)
+        process.end(60.0)
+        bench.cell.processes.remove(process)
+    bench.run(1.0)
+    for name in order:
+        bench.start(name)
+        bench.run(0.5)
+    bench.ready()
 
 
 def _stopped(bench: Bench) -> None:
@@ -190,13 +171,10 @@ def _stopped(bench: Bench) -> None:
     bench.ready()
 
 
-def _clock(jump: int) -> Callable[[Bench], None]:
-    def run(bench: Bench) -> None:
-        bench.tick(jump)
-        bench.rest(0.3)
-        bench.run(LONG)
-
-    return run
+def _clock(jump: int, bench: Bench) -> None:
+    bench.tick(jump)
+    bench.rest(0.3)
+    bench.run(LONG)
 
 
 def _frozen(bench: Bench) -> None:
@@ -205,22 +183,18 @@ def _frozen(bench: Bench) -> None:
     bench.ticking = True
 
 
-def _beside(topic: Topic, make: Callable[[Bench, int], Any]) -> Callable[[Bench], None]:
-    """Return a fault on another topic than the joint states, which go on."""
+def _beside(topic: Topic, make: Callable[[Bench, int], Any], bench: Bench) -> None:
+    """Publish on another topic than the joint states, which go on."""
+    publisher = bench.publisher(topic)
+    bench.cell.wait(lambda: publisher.get_subscription_count() > 0, 'listeners')
 
-    def run(bench: Bench) -> None:
-        publisher = bench.publisher(topic)
-        bench.cell.wait(lambda: publisher.get_subscription_count() > 0, 'listeners')
+    def each(k: int) -> None:
+        bench.send(bench.joint_state())
+        if k % 3 == 0:
+            publisher.publish(make(bench, k))
 
-        def each(k: int) -> None:
-            bench.send(bench.joint_state())
-            if k % 3 == 0:
-                publisher.publish(make(bench, k))
-
-        bench.run(LONG, each)
-        bench.cell.node.destroy_publisher(publisher)
-
-    return run
+    bench.run(LONG, each)
+    bench.cell.node.destroy_publisher(publisher)
 
 
 def _nan_pose(bench: Bench, _: int) -> Any:
@@ -260,83 +234,85 @@ def _other_namespace(bench: Bench) -> None:
 
 
 JOINT_FAULTS = (
-    Fault('NaN position', _third(_set('position', 2, float('nan')))),
-    Fault('infinite position', _third(_set('position', 0, float('inf')))),
-    Fault('infinite velocity', _third(_set('velocity', 1, float('-inf')))),
-    Fault('fewer positions than names', _third(_short)),
-    Fault('a renamed joint', _third(_renamed)),
+    Fault('NaN position', partial(_third, partial(_set, 'position', 2, float('nan')))),
+    Fault('infinite position', partial(_third, partial(_set, 'position', 0, float('inf')))),
+    Fault('infinite velocity', partial(_third, partial(_set, 'velocity', 1, float('-inf')))),
+    Fault('fewer positions than names', partial(_third, _short)),
+    Fault('a renamed joint', partial(_third, _renamed)),
     Fault("another robot's joints", _foreign),
-    Fault('degrees', _third(_degrees)),
-    Fault('stamp zero', _third(_unset)),
-    Fault('stamps that go back', _third(_shifted(-2 * S))),
+    Fault('degrees', partial(_third, _degrees)),
+    Fault('stamp zero', partial(_third, _unset)),
+    Fault('stamps that go back', partial(_third, partial(_shifted, -2 * S))),
     Fault('a stamp an hour ahead', _future),
-    Fault('random bytes', _bytes(_noise)),
-    Fault('a message cut short', _bytes(lambda data, k: data[: 4 + k % 100])),
-    Fault('no bytes', _bytes(lambda data, k: b'')),
-    Fault('a length of four thousand million', _bytes(_promise)),
-    Fault('ten times the rate', _rate(10.0)),
-    Fault('a tenth of the rate', _rate(0.1)),
+    Fault('random bytes', partial(_bytes, _noise)),
+    Fault('a message cut short', partial(_bytes, lambda data, k: data[: 4 + k % 100])),
+    Fault('no bytes', partial(_bytes, lambda data, k: b'')),
+    Fault('a length of four thousand million', partial(_bytes, _promise)),
+    Fault('ten times the rate', partial(_rate, 10.0)),
+    Fault('a tenth of the rate', partial(_rate, 0.1)),
     Fault('silence and return', _silence),
-    Fault('a second publisher of the same', _twice(0.0)),
-    Fault('a second publisher that differs', _twice(0.05)),
+    Fault('a second publisher of the same', partial(_twice, 0.0)),
+    Fault('a second publisher that differs', partial(_twice, 0.05)),
 )
 """What a joint state can be spoilt by."""
 OTHER_FAULTS = (
     Fault(
         'NaN in a measured pose',
-        _beside(MEASURED_POSE, _nan_pose),
+        partial(_beside, MEASURED_POSE, _nan_pose),
         ('deviation_analyzer', 'deviation_markers', 'live_diagnosis'),
     ),
     Fault(
         'a measured pose without orientation',
-        _beside(MEASURED_POSE, _zero_pose),
+        partial(_beside, MEASURED_POSE, _zero_pose),
         ('deviation_analyzer', 'deviation_markers', 'live_diagnosis'),
     ),
     Fault(
         'random bytes as measured pose',
-        _beside(MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
+        partial(_beside, MEASURED_POSE, lambda b, k: np.random.default_rng(k).bytes(99)),
         ('deviation_analyzer', 'deviation_markers', 'live_diagnosis', 'recorder'),
     ),
     Fault(
         'measurements in another frame',
-        _beside(MEASURED_POSE, _elsewhere),
+        partial(_beside, MEASURED_POSE, _elsewhere),
         ('deviation_analyzer', 'live_diagnosis'),
     ),
     Fault(
         'measurements a minute ahead of the others',
-        _beside(MEASURED_POSE, _minute_ahead),
+        partial(_beside, MEASURED_POSE, _minute_ahead),
         ('deviation_analyzer', 'live_diagnosis'),
     ),
     Fault('a publisher of another type', _other_type),
     Fault('joint states in another namespace', _other_namespace),
-    Fault('the clock goes back by a minute', _clock(-60 * S)),
-    Fault('the clock goes on by an hour', _clock(HOUR), ()),
+    Fault('the clock goes back by a minute', partial(_clock, -60 * S)),
+    Fault('the clock goes on by an hour', partial(_clock, HOUR), ()),
     Fault('the clock stands still', _frozen, ()),
     Fault(
         'twin killed and started again',
-        _restart(signal.SIGKILL, ['forward_kinematics_twin']),
+        partial(_restart, signal.SIGKILL, ['forward_kinematics_twin']),
         ('deviation_analyzer',),
     ),
     Fault(
         'injector and analyzer killed, started in the other order',
-        _restart(signal.SIGKILL, ['error_injector', 'deviation_analyzer']),
+        partial(_restart, signal.SIGKILL, ['error_injector', 'deviation_analyzer']),
         ('deviation_markers',),
     ),
     Fault(
         'twin, analyzer, markers ended, started in turn',
-        _restart(
-            signal.SIGTERM, ['deviation_markers', 'forward_kinematics_twin', 'deviation_analyzer']
+        partial(
+            _restart,
+            signal.SIGTERM,
+            ['deviation_markers', 'forward_kinematics_twin', 'deviation_analyzer'],
         ),
         (),
     ),
     Fault('discovery lost and found (twin hangs for 25 s)', _stopped, TAKE_JOINTS[1:]),
     Fault(
         'an infinite wrench',
-        _beside(TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf))),
+        partial(_beside, TOOL_WRENCH, lambda b, k: b.make.wrench(b.stamp, np.full(6, np.inf))),
     ),
     Fault(
         'temperature in kelvin',
-        _beside(TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0)),
+        partial(_beside, TEMPERATURE, lambda b, k: b.make.temperature(b.stamp, 294.0)),
     ),
 )
 """What else can come, be missing or be stopped."""

@@ -10,6 +10,7 @@ import struct
 import tempfile
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -37,24 +38,24 @@ def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
     return {
         'URDF with entities that expand': (_laughs, load_robot),
         'URDF that names a file of the machine': (_outside, load_robot),
-        'URDF nested deeply': (_holding('robot.urdf', nested), load_robot),
+        'URDF nested deeply': (partial(_file, 'robot.urdf', nested), load_robot),
         'URDF with a chain of ten thousand links': (_long_chain, load_robot),
         'YAML aliases that expand': (_aliases, load_robot),
-        'YAML nested deeply': (_holding('robot.yaml', '[' * 500_000), load_robot),
+        'YAML nested deeply': (partial(_file, 'robot.yaml', '[' * 500_000), load_robot),
         'YAML that asks for a Python object': (_object, load_robot),
         'YAML path of a device': (_device, read_path),
-        'JSON nested deeply': (_holding('diagnosis.json', '[' * 1_000_000), _model),
-        'mcap chunk of zstd, a gigabyte of zeros': (_bomb('zstd'), _bag),
-        'mcap chunk of lz4, a gigabyte of zeros': (_bomb('lz4'), _bag),
-        'the same chunk with a small size declared': (_bomb('zstd', 1000), _bag),
-        'the same chunk, recovered': (_bomb('zstd'), _recovered),
+        'JSON nested deeply': (partial(_file, 'diagnosis.json', '[' * 1_000_000), _model),
+        'mcap chunk of zstd, a gigabyte of zeros': (partial(_bomb, 'zstd'), _bag),
+        'mcap chunk of lz4, a gigabyte of zeros': (partial(_bomb, 'lz4'), _bag),
+        'the same chunk with a small size declared': (partial(_bomb, 'zstd', declared=1000), _bag),
+        'the same chunk, recovered': (partial(_bomb, 'zstd'), _recovered),
         'mcap record that claims 2^62 bytes': (_claim, _bag),
         'the same record, recovered': (_claim, _recovered),
         'bag file of zstd, gigabytes of zeros': (_packed_file, _bag),
         'message of zstd, a gigabyte of zeros': (_packed_message, _bag),
-        'metadata.yaml that lists ../outside.mcap': (_listing('../outside.mcap'), _bag),
-        'metadata.yaml that lists /etc/passwd': (_listing('/etc/passwd'), _bag),
-        'metadata.yaml that lists a directory': (_listing('..'), _bag),
+        'metadata.yaml that lists ../outside.mcap': (partial(_listing, '../outside.mcap'), _bag),
+        'metadata.yaml that lists /etc/passwd': (partial(_listing, '/etc/passwd'), _bag),
+        'metadata.yaml that lists a directory': (partial(_listing, '..'), _bag),
         'metadata.yaml nested deeply': (_nested_listing, _bag),
         'sqlite3 bag whose table is an endless query': (_endless, _bag),
         'the same bag, recovered': (_endless, _recovered),
@@ -105,11 +106,7 @@ def _model(path: Path) -> Any:
     return load_model(ROBOT, path)
 
 
-def _holding(name: str, content: str) -> Make:
-    return lambda folder: _file(folder, name, content)
-
-
-def _file(folder: Path, name: str, content: str | bytes) -> Path:
+def _file(name: str, content: str | bytes, folder: Path) -> Path:
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
@@ -118,12 +115,12 @@ def _file(folder: Path, name: str, content: str | bytes) -> Path:
 def _laughs(folder: Path) -> Path:
     levels = ''.join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 11))
     text = f'<!DOCTYPE robot [<!ENTITY a0 "ha">{levels}]><robot name="&a10;"/>'
-    return _file(folder, 'robot.urdf', text)
+    return _file('robot.urdf', text, folder)
 
 
 def _outside(folder: Path) -> Path:
     text = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"/>'
-    return _file(folder, 'robot.urdf', text)
+    return _file('robot.urdf', text, folder)
 
 
 def _long_chain(folder: Path) -> Path:
@@ -132,7 +129,7 @@ def _long_chain(folder: Path) -> Path:
         f'<joint name="j{k}" type="fixed"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
         for k in range(9_999)
     )
-    return _file(folder, 'robot.urdf', f'<robot name="x">{links}{joints}</robot>')
+    return _file('robot.urdf', f'<robot name="x">{links}{joints}</robot>', folder)
 
 
 def _aliases(folder: Path) -> Path:
@@ -140,12 +137,12 @@ def _aliases(folder: Path) -> Path:
     for k in range(1, 10):
         aliases = ', '.join([f'*a{k - 1}'] * 10)
         lines.append(f'a{k}: &a{k} [{aliases}]')
-    return _file(folder, 'robot.yaml', '\n'.join(lines))
+    return _file('robot.yaml', '\n'.join(lines), folder)
 
 
 def _object(folder: Path) -> Path:
     text = f'!!python/object/apply:os.system ["touch {folder}/done"]'
-    return _file(folder, 'robot.yaml', text)
+    return _file('robot.yaml', text, folder)
 
 
 def _device(folder: Path) -> Path:
@@ -162,15 +159,12 @@ def _zeros(pack: str) -> bytes:
     return b''.join([*out, packer.flush()])
 
 
-def _bomb(pack: str, declared: int = GIGABYTE) -> Make:
-    def make(folder: Path) -> Path:
-        data = _zeros(pack)
-        name = pack.encode()
-        chunk = struct.pack('<QQQI', 1, 2, declared, 0) + struct.pack('<I', len(name)) + name
-        chunk += struct.pack('<Q', len(data)) + data
-        return _mcap(folder, b'\x06' + struct.pack('<Q', len(chunk)) + chunk)
-
-    return make
+def _bomb(pack: str, folder: Path, declared: int = GIGABYTE) -> Path:
+    data = _zeros(pack)
+    name = pack.encode()
+    chunk = struct.pack('<QQQI', 1, 2, declared, 0) + struct.pack('<I', len(name)) + name
+    chunk += struct.pack('<Q', len(data)) + data
+    return _mcap(folder, b'\x06' + struct.pack('<Q', len(chunk)) + chunk)
 
 
 def _claim(folder: Path) -> Path:
@@ -183,7 +177,7 @@ def _mcap(folder: Path, record: bytes) -> Path:
     header = b'\x01' + struct.pack('<Q', 8 + 4) + struct.pack('<I', 4) + b'ros2'
     header += struct.pack('<I', 0)
     footer = b'\x02' + struct.pack('<Q', 20) + bytes(20)
-    return _file(folder, 'bag.mcap', magic + header + record + footer + magic)
+    return _file('bag.mcap', magic + header + record + footer + magic, folder)
 
 
 def _sample(folder: Path, storage: str = 'mcap') -> tuple[Path, str]:
@@ -191,32 +185,29 @@ def _sample(folder: Path, storage: str = 'mcap') -> tuple[Path, str]:
     kinds = targets()
     bag = folder / 'bag'
     bag.mkdir()
-    _file(bag, f'bag{kinds[storage].suffix}', kinds[storage].seeds[0])
+    _file(f'bag{kinds[storage].suffix}', kinds[storage].seeds[0], bag)
     return bag, kinds['metadata'].seeds[0].decode()
 
 
-def _listing(path: str) -> Make:
-    def make(folder: Path) -> Path:
-        bag, text = _sample(folder)
-        shutil.copy(bag / 'bag.mcap', folder / 'outside.mcap')
-        _file(bag, 'metadata.yaml', text.replace('- bag.mcap', f"- '{path}'"))
-        return bag
-
-    return make
+def _listing(path: str, folder: Path) -> Path:
+    bag, text = _sample(folder)
+    shutil.copy(bag / 'bag.mcap', folder / 'outside.mcap')
+    _file('metadata.yaml', text.replace('- bag.mcap', f"- '{path}'"), bag)
+    return bag
 
 
 def _nested_listing(folder: Path) -> Path:
     bag, _ = _sample(folder)
-    _file(bag, 'metadata.yaml', 'rosbag2_bagfile_information: ' + '[' * 1_000_000)
+    _file('metadata.yaml', 'rosbag2_bagfile_information: ' + '[' * 1_000_000, bag)
     return bag
 
 
 def _packed_file(folder: Path) -> Path:
     bag, text = _sample(folder)
-    _file(bag, 'bag.mcap.zstd', _zeros('zstd') * 3)
+    _file('bag.mcap.zstd', _zeros('zstd') * 3, bag)
     text = text.replace('- bag.mcap', '- bag.mcap.zstd')
     text = text.replace("compression_mode: ''", 'compression_mode: file')
-    _file(bag, 'metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'))
+    _file('metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'), bag)
     return bag
 
 
@@ -226,7 +217,7 @@ def _packed_message(folder: Path) -> Path:
         base.execute('UPDATE messages SET data = ?', (_zeros('zstd'),))
     text = text.replace('- bag.mcap', '- bag.db3').replace(': mcap', ': sqlite3')
     text = text.replace("compression_mode: ''", 'compression_mode: message')
-    _file(bag, 'metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'))
+    _file('metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'), bag)
     return bag
 
 

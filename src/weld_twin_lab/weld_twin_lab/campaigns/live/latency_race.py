@@ -133,23 +133,18 @@ class Race:
             node.create_subscription(
                 contender.kind, contender.answer, contender.hear, deep, raw=True
             )
-        frames = subprocess.Popen(
-            [sys.executable, '-m', f'{__package__}.frames'], stdin=subprocess.PIPE
-        )
-        assert frames.stdin is not None
-        self._stack.callback(frames.wait)
-        self._stack.callback(frames.stdin.close)
-        self._pulse = subprocess.Popen(
-            [sys.executable, '-m', f'{__package__}.pulse'],
-            text=True,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=1,
-        )
-        self._stack.callback(self._pulse.wait)
-        assert self._pulse.stdin is not None
-        self._stack.callback(self._pulse.stdin.close)
+        self._helper('frames', None)
+        self._pulse = self._helper('pulse', subprocess.PIPE)
         return self
+
+    def _helper(self, module: str, out: int | None) -> subprocess.Popen[str]:
+        """Return a module beside this one that runs until its standard input is closed."""
+        words = [sys.executable, '-m', f'{__package__}.{module}']
+        process = subprocess.Popen(words, text=True, stdin=subprocess.PIPE, stdout=out, bufsize=1)
+        assert process.stdin is not None
+        self._stack.callback(process.wait)
+        self._stack.callback(process.stdin.close)
+        return process
 
     def __exit__(self, *_: object) -> None:
         """End all processes."""

@@ -105,6 +105,34 @@ DIAGNOSED = """
     assert '`torch_sag`' in [row[0] for row in effect_rows()]
     assert 'sagging torch' in [title for title, _ in cause_rows()]
 """
+FORM = r'''
+    """Logs of a made-up tracker: a line with its name, then milliseconds and millimetres."""
+
+    from ..formats import Format, form
+
+    form(
+        Format(
+            'Vesper of Example',
+            r'\A#VESPER\n',
+            r'^clock',
+            ((r'^clock$', 'time [ms]'), (r'^(?P<what>\w+) (?P<axis>[xyz])$', r'\g<axis> [mm]')),
+            '\t',
+        )
+    )
+'''
+READ = """
+    from pathlib import Path
+    import numpy as np
+    from weld_twin_msgs_py.tables.cells import read_cells
+
+    rows = '\\n'.join(f'{20 * k}\\t{k}\\t1.5\\t2.5\\t0\\t0\\t0' for k in range(5))
+    names = '\\t'.join(['clock', *(f'{w} {a}' for w in ('torch', 'base') for a in 'xyz')])
+    Path('seen.log').write_text(f'#VESPER\\n{names}\\n{rows}\\n')
+    found = read_cells('seen.log', None, None, marker='torch')
+    assert found.header == ['time [ms]', 'x [mm]', 'y [mm]', 'z [mm]'], found
+    assert found.numbers('x [mm]').tolist() == [0, 1, 2, 3, 4]
+    assert found.said == ['read as the Vesper of Example writes it', "measured is 'torch'"]
+"""
 
 
 @pytest.fixture(scope='module')
@@ -135,3 +163,8 @@ def test_an_effect_and_its_plant_are_a_file_each_and_a_diagnosis_names_it(tree):
     (tree / 'weld_twin_core/effects/torch_sag.py').write_text(dedent(EFFECT), encoding='utf-8')
     (tree / 'weld_twin_lab/plant/torch_neck.py').write_text(dedent(PLANT), encoding='utf-8')
     run(tree, DIAGNOSED, 'test/diagnosis', 'src/weld_twin_core/test', 'docs/_ext')
+
+
+def test_a_form_of_table_is_a_file(tree):
+    (tree / 'weld_twin_msgs_py/tables/forms/vesper.py').write_text(dedent(FORM), encoding='utf-8')
+    run(tree, READ)

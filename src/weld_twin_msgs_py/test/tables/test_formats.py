@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.tables import TableOptions, read_two_tables
+from weld_twin_msgs_py.tables.formats import forms
 
 UR5 = catalog.load('ur5')
 COUNT = 40
@@ -277,3 +279,9 @@ def test_a_trace_that_is_broken_is_told(tmp_path, old, new, words):
     _, seen, _ = both(tmp_path, '', vicon())
     with pytest.raises(DataError, match=words):
         read_two_tables(path, seen, UR5)
+
+
+def test_the_page_has_a_row_for_every_form():
+    page = Path(__file__).parents[4] / 'docs' / 'tables.md'
+    rows = [line.split('|')[1].strip() for line in page.read_text().splitlines() if '|' in line]
+    assert {form.name for form in forms()} <= set(rows)

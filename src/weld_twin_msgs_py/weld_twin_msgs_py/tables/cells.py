@@ -16,20 +16,8 @@ from numpy.typing import NDArray
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .formats import Read, read, recognised
+from .formats import Rank, Read, forms
 from .lines import COMMA, EMPTY, LOOK, decimal_sign, number, split_lines, without_units
-from .recorded_files import (
-    TRACE_MARK,
-    is_c3d,
-    is_joint_targets,
-    is_point_list,
-    is_positions,
-    read_c3d,
-    read_joint_targets,
-    read_point_list,
-    read_positions,
-    read_trace,
-)
 from .words import parted, shortened
 
 
@@ -130,20 +118,16 @@ def read_cells(
     path = Path(path)
     said: list[str] = []
     try:
-        text = path.read_bytes()
+        data = path.read_bytes()
     except OSError as error:
         raise DataError(f"table '{path}' cannot be read: {error.strerror or error}") from None
-    if is_c3d(text):
-        return _as_read(path, read_c3d(path, marker))
-    decoded = _decoded(path, text)
-    if decoded.startswith(TRACE_MARK):
-        return _as_read(path, read_trace(path, decoded))
-    if is_positions(decoded):
-        return _as_read(path, read_positions(path, decoded))
-    if delimiter is None:
-        result = _known(path, decoded, marker)
-        if result is not None:
-            return result
+    result = _known(path, data, marker, Rank.BYTES, Rank.BYTES)
+    if result is None:
+        decoded = _decoded(path, data)
+        last = Rank.POINTS if delimiter is None else Rank.MARK
+        result = _known(path, decoded, marker, Rank.MARK, last)
+    if result is not None:
+        return result
     table = split_lines(path, decoded, delimiter, said)
     reported = {name: parted(name)[1] for name in table.header}
     header, rows = without_units(path, table.header, table.rows, reported)
@@ -155,18 +139,19 @@ def read_cells(
     return Cells(path, header, rows, table.numbers, decimal, said)
 
 
-def _known(path: Path, text: str, marker: str | None) -> Cells | None:
-    """Return a log or export in a form that is known; None for a table like any other."""
-    form = recognised(text)
-    try:
-        if form is not None:
-            return _as_read(path, read(form, text, marker))
-        if is_joint_targets(text):
-            return _as_read(path, read_joint_targets(text))
-        if is_point_list(text):
-            return _as_read(path, read_point_list(text, marker))
-    except DataError as error:
-        raise DataError(f"table '{path}': {error}") from None
+def _known(
+    path: Path, content: str | bytes, marker: str | None, first: Rank, last: Rank
+) -> Cells | None:
+    """Return what is in a form of some ranks; None where it is in none of them."""
+    for form in forms():
+        if not first <= form.rank <= last or not form.tells(content):
+            continue
+        try:
+            return _as_read(path, form.read(path, content, marker))
+        except DataError as error:
+            if form.rank <= Rank.MARK:
+                raise  # it names the file
+            raise DataError(f"table '{path}': {error}") from None
     return None
 
 

@@ -1,21 +1,26 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Logs of controllers and exports of instruments whose form is documented, one small entry each.
+Logs of controllers and exports of instruments whose form is documented: each is a file in `forms/`.
 
-An entry says how such a file is told, which line names its columns, how many lines above belong to
-that header, and which of the joined names mean what. What it does not name is left out: a
-controller's own idea of the pose is no measurement. docs/tables.md lists where each form is
-documented.
+A `Form` says how such a file is told, and what reads it. Where a line names the columns, a `Format`
+is all that is needed: which line that is, how many lines above belong to it, and which of the joined
+names mean what. What it does not name is left out: a controller's own idea of the pose is no
+measurement. docs/tables.md lists where each form is documented.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import IntEnum
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
@@ -52,6 +57,15 @@ class Format:
     gap: str = ''
     """What stands for a coordinate that was not seen."""
 
+    def tells(self, text: str) -> bool:
+        """Return whether a text begins so."""
+        top = '\n'.join(text.splitlines()[:_HEAD]) + '\n'
+        return re.search(self.mark, top) is not None
+
+    def read(self, path: Path, text: str, marker: str | None) -> Read:
+        """Return the columns that mean something here; see `headed`."""
+        return headed(self, text, marker)
+
 
 class Read(NamedTuple):
     """Header, rows as text, the line in the file of each, and sentences."""
@@ -62,67 +76,56 @@ class Read(NamedTuple):
     said: list[str]
 
 
-_MOTIVE = r'^(?:Rigid Body|Marker|Rigid Body Marker) (?P<what>.+?)(?: [0-9A-F]{6,}| \d+)?'
-_RTDE = (
-    (r'^timestamp$', 'time [s]'),
-    (r'^actual_q_(\d)$', r'actual_q_\1 [rad]'),
-    (r'^target_q_(\d)$', r'target_q_\1 [rad]'),
-)
-FORMATS: tuple[Format, ...] = (
-    Format('RTDE of Universal Robots', r'\A(?:\S+ )*actual_q_0 ', r'actual_q_0 ', _RTDE, ' '),
-    Format(
-        'EGM of ABB (abb_libegm)',
-        r'\ATIMESTAMP,R_FB_POS_RJ1,',
-        r'^TIMESTAMP,',
-        ((r'^TIMESTAMP$', 'time [ms]'), (r'^R_FB_POS_RJ(\d)$', r'J\1 [deg]')),
-    ),
-    Format(
-        'Motive of OptiTrack',
-        r'\AFormat Version,',
-        r'^Frame,Time',
-        (
-            (r'Time \(Seconds\)$', 'time [s]'),
-            (_MOTIVE + r' Position (?P<axis>[XYZ])$', r'\g<axis> [{unit}]'),
-            (_MOTIVE + r' Rotation (?P<axis>[XYZW])$', r'q\g<axis>'),
-        ),
-        above=4,
-        unit=r'Length Units,(\w+)',
-    ),
-    Format(
-        'Nexus or Tracker of Vicon',
-        r'\A"?Trajectories"?[,;]*\r?\n',
-        r'^Frame[,;]Sub Frame',
-        ((r'^(?P<what>\S+) (?P<axis>[XYZ])$', r'\g<axis> [{unit}]'), (r'^Frame$', 'frame')),
-        above=1,
-        below=1,
-        unit=r'^[,;]+(mm|m)\b',
-        rate=r'\A"?Trajectories"?[,;]*\r?\n(\d+)',
-    ),
-    Format(
-        'QTM of Qualisys',
-        r'\A(?:FILE_VERSION\t.*\n)?NO_OF_FRAMES\t',
-        r'^MARKER_NAMES\t',
-        ((r'^(?P<what>.+) (?P<axis>[XYZ])$', r'\g<axis> [mm]'), (r'^Time$', 'time [s]')),
-        '\t',
-        rate=r'^FREQUENCY\t([\d.]+)',
-        named_by=r'^MARKER_NAMES\t(.*)',
-        gap='0 0 0',
-    ),
-)
-"""The first whose mark is found counts."""
+class Rank(IntEnum):
+    """How surely a form is told; those of a lower rank are asked first."""
+
+    BYTES = 0
+    """By its first bytes: it is no text."""
+    MARK = 1
+    """By a mark that no table has, whatever delimiter was asked for."""
+    HEADER = 2
+    """By a header that no other maker writes."""
+    TARGETS = 3
+    POINTS = 4
+    """By what stands in its lines: lists of joints, and of points, which are the least certain."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """One kind of file that is no table like any other."""
+
+    name: str
+    """For people, as docs/tables.md has it."""
+    rank: Rank
+    tells: Callable[[Any], bool]
+    """Takes the text, or the bytes of a file that is no text."""
+    read: Callable[[Path, Any, str | None], Read]
+    """Takes path, text or bytes, and the marker that is meant."""
+
+
+_FORMS: list[Form] = []
+
+
+def form(known: Form | Format) -> None:
+    """Make a form known; a file in `forms/` calls it once."""
+    if isinstance(known, Format):
+        known = Form(known.name, Rank.HEADER, known.tells, known.read)
+    _FORMS.append(known)
+
+
+@cache
+def forms() -> tuple[Form, ...]:
+    """Return the forms of all files in `forms/`, in the order in which they are asked."""
+    folder = import_module(f'{__package__}.forms')
+    for file in iter_modules(folder.__path__):
+        import_module(f'{folder.__name__}.{file.name}')
+    return tuple(sorted(_FORMS, key=lambda each: (each.rank, each.name)))
+
+
 _UNITS = {'meters': 'm', 'millimeters': 'mm', 'centimeters': 'cm', 'm': 'm', 'mm': 'mm'}
 
 
-def recognised(text: str) -> Format | None:
-    """Return the format of a file by its beginning, None for a table like any other."""
-    top = '\n'.join(text.splitlines()[:_HEAD]) + '\n'
-    for known in FORMATS:
-        if re.search(known.mark, top):
-            return known
-    return None
-
-
-def read(known: Format, text: str, marker: str | None) -> Read:
+def headed(known: Format, text: str, marker: str | None) -> Read:
     """
     Return the columns of a known format that mean something here.
 

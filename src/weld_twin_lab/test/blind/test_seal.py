@@ -58,9 +58,10 @@ def change(path):
         (lambda c, t: change(t / 'case_0001' / layout.TRUTH), 'truth of case_0001 was changed'),
         (lambda c, t: (c / 'case_0001/more').write_text(''), 'case_0001 was changed'),
         (lambda c, t: (t / 'case_0002').rename(t / 'lost'), 'truth of case_0002 is missing'),
+        (lambda c, t: (c / layout.CASES).write_text('{"schema": "x"}'), "has the schema 'x'"),
     ],
 )
-def test_one_changed_byte_a_file_added_and_a_truth_taken_away_are_found(sealed, spoil, words):
+def test_what_is_not_as_it_was_sealed_is_found(sealed, spoil, words):
     spoil(*sealed)
     with pytest.raises(DataError, match=words):
         seal.opened(*sealed)

@@ -79,6 +79,19 @@ class SealedCase:
     also: tuple[Take, ...] = ()
     """Further recordings to be diagnosed with the training's."""
 
+    def told(self, name: str) -> dict[str, Any]:
+        """Return what it is judged by, in plain values."""
+        return {
+            'name': name,
+            'kind': self.lot.kind,
+            'robot': self.lot.robot,
+            'motion': self.lot.motion,
+            'causes': self.causes,
+            'sites': [site(cause) for cause in self.causes],
+            'alike': self.alike,
+            'ratios': self.ratios,
+        }
+
 
 def make(
     cases: Path,
@@ -284,19 +297,12 @@ def write_truth(place: Path, name: str, case: SealedCase) -> None:
 
 def truth_of(name: str, case: SealedCase) -> dict[str, Any]:
     """Return the truth of a case in plain values."""
-    cell, lot = case.cell, case.lot
+    cell = case.cell
     reachable, outliers = floor(cell, case.causes, case.test)
     every = rms(deviation(cell, case.causes, case.train)) / cell.noise if case.causes else 0.0
     return {
-        'name': name,
-        'kind': lot.kind,
-        'robot': lot.robot,
-        'motion': lot.motion,
-        'construction': lot.families[0] if case.alike else None,
-        'causes': case.causes,
-        'sites': [site(cause) for cause in case.causes],
-        'alike': case.alike,
-        'ratios': case.ratios,
+        **case.told(name),
+        'construction': case.lot.families[0] if case.alike else None,
         'ratio': every,
         'excluded': list(case.excluded),
         'orientation': cell.tracker.orientation,

@@ -27,7 +27,6 @@ from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_c
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..blind.blind_cell import as_recording, of_motion, record
-from ..blind.cause_sizes import site
 from ..blind.deck import Lot
 from ..blind.judging import Judged, judge
 from ..blind.making import SealedCase, draw_case, one_arm
@@ -137,17 +136,7 @@ class SealedCell:
 
     def opened(self) -> dict[str, Any]:
         """Return the truth."""
-        case = self._case
-        return {
-            'name': self.name,
-            'kind': case.lot.kind,
-            'robot': case.lot.robot,
-            'motion': case.lot.motion,
-            'causes': case.causes,
-            'sites': [list(site(cause)) for cause in case.causes],
-            'alike': case.alike,
-            'ratios': case.ratios,
-        }
+        return self._case.told(self.name)
 
     def judged(self, diagnosis: Mapping[str, Any]) -> Judged:
         """Return what a diagnosis is worth."""

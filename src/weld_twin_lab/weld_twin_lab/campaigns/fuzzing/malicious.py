@@ -44,7 +44,10 @@ def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
         'YAML nested deeply': (partial(_file, 'robot.yaml', '[' * 500_000), load_robot),
         'YAML that asks for a Python object': (_object, load_robot),
         'YAML path of a device': (_device, read_path),
-        'JSON nested deeply': (partial(_file, 'diagnosis.json', '[' * 1_000_000), _model),
+        'JSON nested deeply': (
+            partial(_file, 'diagnosis.json', '[' * 1_000_000),
+            partial(load_model, ROBOT),
+        ),
         'mcap chunk of zstd, a gigabyte of zeros': (partial(_bomb, 'zstd'), _bag),
         'mcap chunk of lz4, a gigabyte of zeros': (partial(_bomb, 'lz4'), _bag),
         'the same chunk with a small size declared': (partial(_bomb, 'zstd', declared=1000), _bag),
@@ -100,10 +103,6 @@ def _bag(path: Path) -> Any:
 
 def _recovered(path: Path) -> Any:
     return recover(path, path.with_name('recovered'))
-
-
-def _model(path: Path) -> Any:
-    return load_model(ROBOT, path)
 
 
 def _file(name: str, content: str | bytes, folder: Path) -> Path:

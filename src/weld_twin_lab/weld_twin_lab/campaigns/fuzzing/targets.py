@@ -83,8 +83,15 @@ def targets() -> dict[str, Target]:
             '.yaml', 'yaml', _encoded(yaml_text(r.to_mapping()) for r in robots), load_robot
         ),
         'urdf': Target('.urdf', 'text', _encoded([URDF, _urdf()]), load_robot),
-        'effects': Target('.yaml', 'yaml', _encoded([EFFECTS]), _effects),
-        'tolerances': Target('.yaml', 'yaml', _encoded([TOLERANCES]), _tolerances),
+        'effects': Target(
+            '.yaml', 'yaml', _encoded([EFFECTS]), lambda path: read_effects(path, ROBOT)
+        ),
+        'tolerances': Target(
+            '.yaml',
+            'yaml',
+            _encoded([TOLERANCES]),
+            lambda path: tolerances_from_list(read_yaml(path, 'tolerance file'), ROBOT),
+        ),
         'table': Target('.csv', 'text', _tables(), lambda path: read_table(path, ROBOT)),
         'diagnosis': Target('.json', 'json', _encoded([_diagnosis()]), _model),
         'path': Target('.yaml', 'yaml', _encoded(PATHS), read_path),
@@ -107,14 +114,6 @@ def _urdf() -> str:
     with tempfile.TemporaryDirectory() as place:
         write_urdf(Path(place) / 'robot.urdf', ROBOT)
         return (Path(place) / 'robot.urdf').read_text(encoding='utf-8')
-
-
-def _effects(path: Path) -> Any:
-    return read_effects(path, ROBOT)
-
-
-def _tolerances(path: Path) -> Any:
-    return tolerances_from_list(read_yaml(path, 'tolerance file'), ROBOT)
 
 
 def _model(path: Path) -> Any:

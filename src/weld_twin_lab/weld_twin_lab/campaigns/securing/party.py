@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE, Topic
 
 NAME = 'party'
 """What it is called."""
@@ -49,8 +50,9 @@ def main() -> int:
         parameter_overrides=[Parameter('start_type_description_service', value=False)],
     )
     poses: list[object] = []
-    publisher = _offered(node)
-    _heard(node, poses)
+    publisher = _granted(node.create_publisher, JOINT_STATES, JOINT_STATES.offered.to_rclpy())
+    asked = TWIN_POSE.requested.to_rclpy()
+    _granted(node.create_subscription, TWIN_POSE, poses.append, asked, raw=True)
     _meet(node, publisher)
     make, names = ros_messages(), catalog.load('ur5').joint_names
     begun, turn = time.monotonic(), 0
@@ -70,23 +72,13 @@ def main() -> int:
     return 0
 
 
-def _offered(node: Node) -> Any:
-    """Return a publisher of joint states; None where the middleware refuses it."""
-    quality = JOINT_STATES.offered.to_rclpy()
+def _granted(make: Callable[..., Any], topic: Topic, *given: Any, **options: Any) -> Any:
+    """Return a publisher or subscription; None where the middleware refuses it."""
     try:
-        return node.create_publisher(JOINT_STATES.message_class(), JOINT_STATES.name, quality)
+        return make(topic.message_class(), topic.name, *given, **options)
     except RuntimeError as error:  # rclpy's own error of it has no public name
         print(error, file=sys.stderr)
         return None
-
-
-def _heard(node: Node, poses: list[object]) -> None:
-    """Collect poses from now on, unless the middleware refuses it."""
-    kind, quality = TWIN_POSE.message_class(), TWIN_POSE.requested.to_rclpy()
-    try:
-        node.create_subscription(kind, TWIN_POSE.name, poses.append, quality, raw=True)
-    except RuntimeError as error:
-        print(error, file=sys.stderr)
 
 
 def _meet(node: Node, publisher: Any) -> None:

@@ -42,8 +42,9 @@ the next, a hundred what is a tenth of the noise."""
 AGREED = 2.5
 """Standard errors from which on what neighbours have in common is no chance: of four numbers of them,
 agreeing or not, chance gets so far once in twenty at the most."""
-HIDDEN = 0.8
-"""Standard errors of a variance that shows nothing which it has on the average: a half normal's mean."""
+IN_COMMON = np.logspace(-8.0, 0.0, 161)
+"""Parts of what is left that neighbours may have in common. Before the data every decade is as likely as
+every other, down to that of a ten-thousandth of the size, which is none (`sizes.SIZES`)."""
 ROUNDING = 1e-10
 """Added to a covariance of unit diagonal, so that it stays definite where its inverse hardly is."""
 MOST = 800
@@ -361,9 +362,10 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
     What the instrument does differs from one sample to the next, what the arm does does not. Over few
     neighbours what changes fast shows, over many what is small: the number counts at which it is
     surest. Samples that err against each other have no white noise either. Where none shows anything, a
-    motion may still hide some. Shifts count, or all that a contact sees.
+    motion may still hide some: as much as is believed where chance is least. Shifts count, or all that a
+    contact sees.
     """
-    sure, hidden, regions = list[tuple[float, float]](), 1.0, np.unique(foretold.region)
+    told, regions = list[tuple[float, float, float]](), np.unique(foretold.region)
     sign = 1.0 if foretold.at_rest else -1.0
     sums: dict[int, list[Array]] = {}
     foreseen = np.sqrt(2.0 / regions.size)  # how far a variance of so many draws may be off
@@ -388,13 +390,20 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
         square, each_open = total[3:5] / max(total[5], 1.0) * (1.0, sign)
         chance = np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
         common = max(agree - open_, min(open_, 0.0) - agree)
-        whole = max(square - each_open, common, 1e-300)
-        if common > AGREED * max(chance, 1e-300):
-            sure.append((common / max(chance, 1e-300), common / whole))
-        hidden = min(hidden, HIDDEN * chance / whole)
-    if sure:
-        return max(sure)[1]
-    return 0.0 if foretold.at_rest else hidden
+        whole, chance = max(square - each_open, common, 1e-300), max(chance, 1e-300)
+        told.append((common / chance, chance / whole, (agree - open_) / whole))
+    if not told:
+        return float(not foretold.at_rest)
+    steps, chance, _ = max(told)
+    if steps > AGREED:
+        return steps * chance
+    return 0.0 if foretold.at_rest else _believed(*min(one[1:] for one in told))
+
+
+def _believed(chance: float, common: float) -> float:
+    """Return the mean of `IN_COMMON` given what is seen in common, and its standard error."""
+    likely = np.exp(-0.5 * ((common - IN_COMMON) / chance) ** 2)
+    return float(likely @ IN_COMMON / max(float(likely.sum()), 1e-300))
 
 
 def _neighbours(

@@ -317,6 +317,19 @@ def test_the_size_of_one_of_two_that_take_each_other_s_place_is_known_given_the_
     assert known.doubt(zero, {('link_twist', joint)}) == known.doubt(zero)
 
 
+def test_what_the_other_was_found_to_be_would_be_the_size_of_the_one():
+    """All of 8e-4 was fitted as the tilt; were the zero at work in its place, it would be that large."""
+    robot = load('ur5')
+    joint = robot.joint_names[2]
+    zero, tilt = REGISTRY['joint_offset'](joint, 0.0), REGISTRY['axis_parallelism'](joint, 8e-4)
+    step = 3e-4 * np.random.default_rng(0).normal(size=4000)
+    what = Directions((), 1, (zero, tilt))
+    known = posterior(robot, what, np.cov(np.stack([step, -step])) + 1e-10 * np.eye(2))
+    assert known.doubt(zero, {('axis_parallelism', joint)})[0] == pytest.approx(8e-4, rel=0.05)
+    # Of the tilt, the zero being nothing, it is known as closely as it was measured.
+    assert known.doubt(tilt, {('joint_offset', joint)})[0] < 3e-5
+
+
 def test_on_a_path_a_tool_strays_as_far_as_a_stretch_of_the_recordings_did():
     robot = load('ur5')
     rest = Discrepancy(1e-5, 1e-5, np.zeros(6), np.zeros(6), 0.1, None, np.array([0.0, 1e-3]))

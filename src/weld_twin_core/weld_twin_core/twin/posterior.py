@@ -171,7 +171,8 @@ class Posterior:
         effect: of the fitted model.
         instead: names and joints of effects that may be at work in its place. Its size is told for
         the case that it is the one and they are not, so it is that given theirs (conditional
-        covariance of a normal vector, e.g. Bishop 2006, eq. 2.82).
+        covariance and mean of a normal vector, e.g. Bishop 2006, eq. 2.81): what the fitted model
+        has of them would be its own.
         """
         what = self.directions
         for mine, here in zip(what.effects, what.own, strict=True):
@@ -190,7 +191,8 @@ class Posterior:
             given = np.concatenate([np.zeros(0, dtype=int), *others])
             shared = square[here, given]
             known = shared @ np.linalg.pinv(square[np.ix_(given, given)], hermitian=True)
-            variance = np.diag(square[here, here] - known @ shared.T)
+            theirs = known @ (what.fitted()[given] / size[given])
+            variance = np.diag(square[here, here] - known @ shared.T) + theirs**2
             return size[here] * np.sqrt(np.maximum(variance, 0.0))
         return np.zeros(effect.fit.coordinates().size)
 

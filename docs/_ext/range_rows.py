@@ -1,11 +1,12 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine can have, and what is wrong then, as the effects say it: the rows of tables."""
+"""What effects, and sections of the sheet, say of themselves: the rows of tables."""
 
 from __future__ import annotations
 
 from weld_twin_core.effects import REGISTRY, MemoryEffect, Plausible
 from weld_twin_core.effects.effect import SLIDING_UNITS, Effect
+from weld_twin_report.report.sections import sections
 
 HEADER = ('effect', 'parameter', 'unit', 'spread', 'least', 'most', 'source')
 EFFECTS = ('effect', 'of', 'parameters', 'options', 'formula', 'needs', 'memory', 'derivative')
@@ -51,6 +52,11 @@ def cause_rows() -> list[tuple[str, str]]:
     """Return a row for every cause that a diagnosis may name, by what people call it."""
     traits = [kind.traits for kind in REGISTRY.values() if kind.traits.cause]
     return sorted((each.title, each.meaning) for each in traits)
+
+
+def word_rows() -> list[tuple[str, str]]:
+    """Return the words that sections of the sheet explain themselves, with their meanings."""
+    return sorted(item for section in sections() for item in section.words.items())
 
 
 def _row(found: Plausible) -> tuple[str, ...]:

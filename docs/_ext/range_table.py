@@ -6,6 +6,7 @@ Tables of what effects say of themselves.
 ``{weld-twin-effects}``: what there is; ``weld-twin-effect-classes``: their classes, for a reference.
 ``{weld-twin-ranges}``: what a machine can have; ``sliding``: where joints slide.
 ``{weld-twin-causes}``: what is wrong with a machine that has them.
+``{weld-twin-words}``: what sections of the sheet say of their own words.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from page_table import page_table
-from range_rows import EFFECTS, HEADER, cause_rows, effect_rows, range_rows
+from range_rows import EFFECTS, HEADER, cause_rows, effect_rows, range_rows, word_rows
 from sphinx.application import Sphinx
 
 from weld_twin_core.effects import REGISTRY
@@ -59,10 +60,20 @@ class Causes(Directive):
         return [page_table(('cause', 'what is wrong'), cause_rows(), 'sentences')]
 
 
+class Words(Directive):
+    """The table of words that sections of the sheet explain; nothing where there are none."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the table."""
+        rows = word_rows()
+        return [page_table(('word', 'meaning'), rows, 'sentences')] if rows else []
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add the directive."""
     app.add_directive('weld-twin-effects', Effects)
     app.add_directive('weld-twin-effect-classes', EffectClasses)
     app.add_directive('weld-twin-ranges', Ranges)
     app.add_directive('weld-twin-causes', Causes)
+    app.add_directive('weld-twin-words', Words)
     return {'parallel_read_safe': True}

@@ -15,9 +15,9 @@ from weld_twin_nodes.wording.words import DEPENDENCES, PLACES, STATUS
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / 'docs/_ext'))
 
-from range_rows import cause_rows  # noqa: E402
+from range_rows import cause_rows, word_rows  # noqa: E402
 
-CAUSES = '\n'.join(f'| {title} | {meaning} |' for title, meaning in cause_rows())
+CAUSES = '\n'.join(f'| {title} | {meaning} |' for title, meaning in (*cause_rows(), *word_rows()))
 GLOSSARY = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8') + '\n' + CAUSES
 ORDINARY = (
     'a acceleration against all and apart are as at by can cannot cause controller data direction do '

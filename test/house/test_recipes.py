@@ -133,6 +133,29 @@ READ = """
     assert found.numbers('x [mm]').tolist() == [0, 1, 2, 3, 4]
     assert found.said == ['read as the Vesper of Example writes it', "measured is 'torch'"]
 """
+SECTION = '''
+    """How many samples the answer stands on."""
+
+    from .html import section, tag
+    from .sections import on_page
+
+
+    @on_page('answer', 45, words={'tally': 'how many samples the answer stands on'})
+    def tally_section(page):
+        count = page.diagnosis.gap.samples
+        return section('Tally', tag('p', f'{count} samples were counted.'), id_='tally')
+'''
+DRAWN = """
+    import diagnoses
+    from range_rows import word_rows
+    from weld_twin_report.report import report_page
+
+    page = report_page(diagnoses.backlash())
+    places = [page.index(f'id="{name}"') for name in ('seam', 'tally', 'where')]
+    assert places == sorted(places), places
+    assert f'{diagnoses.backlash().gap.samples} samples were counted.' in page
+    assert ('tally', 'how many samples the answer stands on') in word_rows()
+"""
 
 
 @pytest.fixture(scope='module')
@@ -168,3 +191,8 @@ def test_an_effect_and_its_plant_are_a_file_each_and_a_diagnosis_names_it(tree):
 def test_a_form_of_table_is_a_file(tree):
     (tree / 'weld_twin_msgs_py/tables/forms/vesper.py').write_text(dedent(FORM), encoding='utf-8')
     run(tree, READ)
+
+
+def test_a_section_of_the_page_is_a_file(tree):
+    (tree / 'weld_twin_report/report/tally.py').write_text(dedent(SECTION), encoding='utf-8')
+    run(tree, DRAWN, 'src/weld_twin_report/test/report', 'docs/_ext')

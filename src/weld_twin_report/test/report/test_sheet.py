@@ -18,10 +18,10 @@ from weld_twin_nodes.wording.quantities import small_turn, turned, with_ends
 from weld_twin_nodes.wording.switches import cause_name, switches
 from weld_twin_report.cli.commands import BRANDS as CHOICES
 from weld_twin_report.report import report_page
-from weld_twin_report.report.acceptance import Demand
 from weld_twin_report.report.controllers import BRANDS, brand_of
 from weld_twin_report.report.diagnosis_page import Sheet, joint_labels, renamed
 from weld_twin_report.report.page_data import components, page_data, sides_words
+from weld_twin_report.report.sections import Demand
 
 THREE = diagnoses.circle()
 PARTS = ('base_yaw_actuator', 'shoulder_lift', 'forearm_elbow_rotation', 'w1', 'w2', 'w3')

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,9 @@ from weld_twin_nodes.wording.switches import switches, trusted
 from weld_twin_nodes.wording.words import listed, unnamed
 
 from .html import Html, joined, section, table, tag
-from .page_data import worst
+from .page_data import at_rest, instant, worst
 from .performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows
-from .seam_view import at_rest, instant
+from .sections import Content, Demand, on_page
 
 WORDS = {
     PASS: 'passes',
@@ -37,15 +36,6 @@ _REMEDY = (
     'To be able to say it: a better instrument, a mended robot measured anew, or another tolerance '
     'agreed on.'
 )
-
-
-@dataclass(frozen=True)
-class Demand:
-    """What the reader demands of the robot."""
-
-    tolerance_m: float | None = None  # largest deviation of the tool point allowed along the seam
-    uncertainty_m: float | None = None
-    """Standard uncertainty of a measured position, as the certificate of the instrument has it."""
 
 
 def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
@@ -101,8 +91,10 @@ def most_data(diagnosis: Diagnosis) -> dict[str, float]:
     }
 
 
-def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
+@on_page('answer', 10)
+def acceptance_section(page: Content) -> Html | None:
     """Return the judgement, with a field for a tolerance; None where contacts took its place."""
+    diagnosis, demand = page.diagnosis, page.demand
     if diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     rule = rule_of(diagnosis, demand)

@@ -40,8 +40,7 @@ from weld_twin_nodes.wording.words import (
 
 from .charts import values
 from .controllers import BRANDS, UNCHECKED, UNNAMED, correction, gearing
-from .page_data import components, rms_words, sides_words
-from .seam_view import seen_at
+from .page_data import components, rms_words, seen_at, sides_words
 from .to_do import TOGETHER
 
 LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')

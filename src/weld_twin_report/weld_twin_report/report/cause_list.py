@@ -36,8 +36,8 @@ from .answer import Answer
 from .cause_answer import LEVEL_HEADS, CauseAnswer
 from .charts import Axis, Line, chart, curve_figure, furthest_off
 from .html import Bar, Child, Html, bars, joined, lines, pairs, section, sentences, table, tag
-from .page_data import along, drawn, static
-from .seam_view import at_rest
+from .page_data import along, at_rest, drawn, static
+from .sections import Content, on_page
 from .to_do import reason_and_joints, untried, warned
 
 _TRIVIAL = 1e-4
@@ -50,8 +50,10 @@ _EFFECT = ('Effect on the seam', 'Effect at the stations')
 """What a cause does, along a motion and at stations at rest."""
 
 
-def causes_cards(answer: Answer) -> Html | None:
+@on_page('answer', 20)
+def causes_cards(page: Content) -> Html | None:
     """Return the shares of the gap and a card for every cause; None without any."""
+    answer = page.answer
     # A cause matters that holds a share, or at least moves the tool so that mending it shows.
     big = [c for c in answer.causes if max(c.cause.share, c.own_square) >= _TRIVIAL]
     shown = big[:MOST]
@@ -227,9 +229,10 @@ _ENOUGH = (
 )
 
 
-def causes_section(answer: Answer) -> Html:
+@on_page('engineers', 10)
+def causes_section(page: Content) -> Html:
     """Return parameters, candidates and equivalence sets."""
-    diagnosis = answer.diagnosis
+    answer, diagnosis = page.answer, page.diagnosis
     return section(
         'Which effect',
         _found(answer),
@@ -240,9 +243,10 @@ def causes_section(answer: Answer) -> Html:
     )
 
 
-def changed_section(answer: Answer) -> Html | None:
+@on_page('engineers', 20)
+def changed_section(page: Content) -> Html | None:
     """Return what the later recordings have that the first has not; None where it was not asked."""
-    changed = answer.changed
+    answer, changed = page.answer, page.answer.changed
     if changed is None:
         return None
     reported = tag('p', answer.nothing_changed)
@@ -385,8 +389,10 @@ _STEPS = 12
 """Steps of the waterfall; more are drawn as one."""
 
 
-def shrink_section(diagnosis: Diagnosis) -> Html:
+@on_page('engineers', 30)
+def shrink_section(page: Content) -> Html:
     """Return the waterfall, how it was judged, and what is left."""
+    diagnosis = page.diagnosis
     return section(
         'How far it shrinks',
         _waterfall(diagnosis),

@@ -17,6 +17,7 @@ from weld_twin_nodes.wording.switches import as_it_is, trusted
 
 from .html import Html, section, tag
 from .page_data import along, drawn, static
+from .sections import Content, on_page
 
 _MOST = 3
 """Circles drawn."""
@@ -89,9 +90,10 @@ def reversals(recording: Recording) -> list[tuple[int, float]]:
     return out
 
 
-def circles_section(diagnosis: Diagnosis) -> Html | None:
+@on_page('answer', 40)
+def circles_section(page: Content) -> Html | None:
     """Return the polar plots; None where nothing went round a circle."""
-    result = circles(diagnosis)
+    diagnosis, result = page.diagnosis, circles(page.diagnosis)
     if not result:
         return None
     figures = [_figure(diagnosis, k, circle) for k, circle in result]

@@ -13,6 +13,7 @@ from weld_twin_core.diagnosis.result import ContactResult, Diagnosis, KnownLengt
 from weld_twin_nodes.wording.quantities import millimetres
 
 from .html import Html, columns, section, table, tag
+from .sections import Content, on_page
 
 _MOST = 24
 """Contacts that are drawn; more would make a page of pictures."""
@@ -22,9 +23,10 @@ _STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """What half a picture may stand for [mm]: lengths that are easy to read."""
 
 
-def contacts_section(diagnosis: Diagnosis) -> Html | None:
+@on_page('answer', 30)
+def contacts_section(page: Content) -> Html | None:
     """Return the clouds and figures of contacts; None where an instrument measured."""
-    result = diagnosis.contacts
+    diagnosis, result = page.diagnosis, page.diagnosis.contacts
     if result is None:
         return None
     return section(

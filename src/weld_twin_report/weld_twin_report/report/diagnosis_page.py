@@ -18,29 +18,17 @@ from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.wording.quantities import counted
 
-from .acceptance import (
-    Demand,
-    acceptance_section,
-    judgement,
-    largest,
-    most_data,
-    on_what,
-    rule_data,
-    rule_of,
-)
+from .acceptance import judgement, largest, most_data, on_what, rule_data, rule_of
 from .answer import Answer
-from .cause_list import causes_cards, causes_section, changed_section, shrink_section
 from .charts import embedded
-from .circle_plot import circle_data, circles_section
-from .contact_clouds import contacts_section
+from .circle_plot import circle_data
 from .controllers import brand_of
-from .footing import checks_section, inputs_section, next_section, printed_section
-from .gap_location import where_section
 from .html import Html, document, joined, own_file, tag
 from .opening import header, opening
-from .page_data import page_data
-from .seam_view import left_out, seam_section
+from .page_data import left_out, page_data
+from .sections import Content, Demand, drawn
 
+_FOLDED = 'For engineers: what else it could be, and how far each effect shrinks it'
 SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
 
 
@@ -68,18 +56,21 @@ def report_page(
     brand = sheet.brand or brand_of(diagnosis.model.robot.name)
     answer = Answer(diagnosis, rule, brand)
     judged = _judged(diagnosis, rule) if answer.sound else None
+    page = Content(answer, sheet.demand, inputs, judged)
     body = joined(
         [
             header(answer),
             opening(answer, judged),
-            *(_causes(answer, sheet.demand) if answer.sound else ()),
-            checks_section(diagnosis),
-            _engineers(answer) if answer.sound else None,
-            printed_section(answer, inputs, judged),
+            *(drawn('answer', page) if answer.sound else ()),
+            *drawn('checks', page),
+            tag('details.detail', tag('summary', _FOLDED), *drawn('engineers', page))
+            if answer.sound
+            else None,
+            *drawn('print', page),
         ]
     )
     title = f'{answer.status} · {diagnosis.model.robot.name} · diagnosis'
-    foot = tag('div.detail', inputs_section(inputs))
+    foot = tag('div.detail', *drawn('foot', page))
     main = tag('main', Html(renamed(body, sheet.joints)), foot)
     if not answer.sound:
         return document(title, main)
@@ -92,30 +83,6 @@ def report_page(
     reported = Html(renamed(embedded(data, 'data'), sheet.joints))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
     return document(title, main, reported, charts=True, scripts=scripts)
-
-
-def _causes(answer: Answer, demand: Demand) -> tuple[Html | None, ...]:
-    """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
-    diagnosis = answer.diagnosis
-    return (
-        acceptance_section(diagnosis, demand),
-        causes_cards(answer),
-        seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
-        circles_section(diagnosis),
-        where_section(answer),
-        next_section(answer),
-    )
-
-
-def _engineers(answer: Answer) -> Html:
-    """Return alternatives, changes and how the gap shrinks, for those who want more than an answer."""
-    return tag(
-        'details.detail',
-        tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),
-        causes_section(answer),
-        changed_section(answer),
-        shrink_section(answer.diagnosis),
-    )
 
 
 def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:

@@ -25,6 +25,7 @@ from weld_twin_nodes.wording.words import (
 
 from .answer import Answer
 from .html import Child, Html, joined, pairs, section, table, tag
+from .sections import Content, on_page
 from .to_do import made_for, minutes, untried
 
 _APART = (
@@ -42,9 +43,10 @@ _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 """What needs attention comes first."""
 
 
-def next_section(answer: Answer) -> Html:
+@on_page('answer', 60)
+def next_section(page: Content) -> Html:
     """Return the measurement that would decide, or that none is needed."""
-    diagnosis = answer.diagnosis
+    answer, diagnosis = page.answer, page.diagnosis
     wanted = diagnosis.next_experiment
     if wanted is not None:
         sure = diagnosis.status == 'identified'
@@ -157,8 +159,10 @@ def _plain(value: Any) -> str:
     return str(value)
 
 
-def checks_section(diagnosis: Diagnosis) -> Html:
+@on_page('checks', 10)
+def checks_section(page: Content) -> Html:
     """Return the checks of the data, those that need attention first."""
+    diagnosis = page.diagnosis
     ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 1))
     items = [
         tag(
@@ -199,6 +203,12 @@ def _left_out(diagnosis: Diagnosis) -> list[Html]:
     return out
 
 
+@on_page('foot', 10)
+def made_from_section(page: Content) -> Html:
+    """Return inputs and version; in the foot of the sheet."""
+    return inputs_section(page.inputs)
+
+
 def inputs_section(inputs: Sequence[InputFile]) -> Html:
     """Return inputs and version, so that the answer can be had again."""
     rows: list[list[Child]] = [
@@ -222,19 +232,23 @@ _FINDINGS = 3
 """Checks told on paper, the gravest; the page has all."""
 
 
-def printed_section(answer: Answer, inputs: Sequence[InputFile], judged: Html | None) -> Html:
+@on_page('print', 10)
+def printed_section(page: Content) -> Html:
     """Return what only a print shows, with the lines to sign on: a side may part from the other."""
-    diagnosis = answer.diagnosis
+    answer, diagnosis = page.answer, page.diagnosis
     rows: list[tuple[str, Child]] = [
         ('Data', _stood_out(diagnosis)),
         ('Cannot be told apart', '; '.join(answer.open)),
         ('Measure next', measured_next(diagnosis)),
-        ('Made from', _files(inputs)),
+        ('Made from', _files(page.inputs)),
     ]
     lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
     status = tag('span', answer.status, class_=f'status {diagnosis.status}')
     return tag(
-        'section.printed', pairs(rows), tag('div', status, judged), tag('p.signatures', *lines)
+        'section.printed',
+        pairs(rows),
+        tag('div', status, page.judged),
+        tag('p.signatures', *lines),
     )
 
 

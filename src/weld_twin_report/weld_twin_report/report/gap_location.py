@@ -17,8 +17,8 @@ from weld_twin_nodes.wording.words import DEPENDENCES, HALF, REGIMES, likely, li
 from .answer import Answer
 from .cause_answer import CauseAnswer
 from .html import Html, bars, joined, section, tag
-from .page_data import SEEN, components, sides_words, worst
-from .seam_view import at_rest, seen_at
+from .page_data import SEEN, at_rest, components, seen_at, sides_words, worst
+from .sections import Content, on_page
 
 _FRAMED = (
     ' Framed: the one that holds the instant looked at, at first the largest single deviation.'
@@ -39,9 +39,10 @@ _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
 
-def where_section(answer: Answer) -> Html:
+@on_page('answer', 50)
+def where_section(page: Content) -> Html:
     """Return where the causes lie, the same shares as theirs, and the map of each by itself."""
-    diagnosis = answer.diagnosis
+    answer, diagnosis = page.answer, page.diagnosis
     parts = [_part('By direction', _directions(diagnosis))]
     if diagnosis.status != 'none':
         parts[:0] = [

@@ -31,8 +31,7 @@ from .answer import Answer
 from .cause_answer import CauseAnswer
 from .html import Child, Figure, Html, joined, lines, pairs, tag
 from .html import figures as drawn
-from .page_data import components, sides_words, worst
-from .seam_view import at_rest, instant, left_out
+from .page_data import at_rest, components, instant, left_out, sides_words, worst
 from .to_do import warned
 
 _CAUSES = 4

@@ -259,3 +259,26 @@ def worst(diagnosis: Diagnosis) -> tuple[int, int, float] | None:
         if size.size and (best is None or size.max() > best[2]):
             best = k, int(np.argmax(size)), float(size.max())
     return best
+
+
+def at_rest(diagnosis: Diagnosis) -> bool:
+    """Tell whether all that was recorded are stations at rest."""
+    return bool(diagnosis.recordings) and all(r.joints.static for r in diagnosis.recordings)
+
+
+def left_out(diagnosis: Diagnosis) -> tuple[int, int]:
+    """Return how many samples no figure counts, and how many there are."""
+    good = [trusted(diagnosis, k) for k in range(len(diagnosis.traces.t))]
+    return sum(int((~g).sum()) for g in good), sum(g.size for g in good)
+
+
+def seen_at(diagnosis: Diagnosis, k: int, sample: int, size: float) -> str:
+    """Return where along a recording a deviation [m] is, in words."""
+    return f'{millimetres(size)} at {instant(diagnosis, k, sample)}'
+
+
+def instant(diagnosis: Diagnosis, k: int, sample: int) -> str:
+    """Return when a sample of a recording was taken, or which station it is."""
+    if static(diagnosis, k):
+        return f'station {sample + 1}'
+    return f'{along(diagnosis, k)[sample]:.1f} s'

@@ -14,7 +14,8 @@ from weld_twin_nodes.wording.words import listed
 
 from .charts import Axis, Line, chart
 from .html import Child, Html, joined, section, tag
-from .page_data import along, drawn, static
+from .page_data import along, at_rest, drawn, left_out, seen_at, static
+from .sections import Content, on_page
 
 _LINE = (
     'The thin line is where the model of the robot has the tool, the coloured one where it was '
@@ -32,13 +33,12 @@ _RECORDINGS = 6
 """Recordings drawn over time."""
 
 
-def at_rest(diagnosis: Diagnosis) -> bool:
-    """Tell whether all that was recorded are stations at rest."""
-    return bool(diagnosis.recordings) and all(r.joints.static for r in diagnosis.recordings)
-
-
-def seam_section(diagnosis: Diagnosis) -> Html:
-    """Return switches, the two views, and the deviation over time; scripts draw them."""
+@on_page('answer', 30)
+def seam_section(page: Content) -> Html | None:
+    """Return switches, two views and the deviation over time; None where contacts took its place."""
+    diagnosis = page.diagnosis
+    if diagnosis.contacts is not None:
+        return None
     stations = at_rest(diagnosis)
     changes = bool(switches(diagnosis)) or bool(diagnosis.model.found)
     return section(
@@ -91,12 +91,6 @@ def _figures(diagnosis: Diagnosis) -> Html:
             for name, key, value, note in cells
         ),
     )
-
-
-def left_out(diagnosis: Diagnosis) -> tuple[int, int]:
-    """Return how many samples no figure counts, and how many there are."""
-    good = [trusted(diagnosis, k) for k in range(len(diagnosis.traces.t))]
-    return sum(int((~g).sum()) for g in good), sum(g.size for g in good)
 
 
 def _counting(diagnosis: Diagnosis) -> str:
@@ -199,15 +193,3 @@ def _after_words(diagnosis: Diagnosis) -> str:
 
 def _size(deviation: np.ndarray) -> np.ndarray:
     return np.asarray(1e3 * np.linalg.norm(deviation, axis=1))
-
-
-def seen_at(diagnosis: Diagnosis, k: int, sample: int, size: float) -> str:
-    """Return where along a recording a deviation [m] is, in words."""
-    return f'{millimetres(size)} at {instant(diagnosis, k, sample)}'
-
-
-def instant(diagnosis: Diagnosis, k: int, sample: int) -> str:
-    """Return when a sample of a recording was taken, or which station it is."""
-    if static(diagnosis, k):
-        return f'station {sample + 1}'
-    return f'{along(diagnosis, k)[sample]:.1f} s'

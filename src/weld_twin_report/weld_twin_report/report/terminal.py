@@ -13,10 +13,11 @@ from rich.table import Table
 
 from weld_twin_core.diagnosis.result import Diagnosis
 
-from .acceptance import Demand, rule_of
+from .acceptance import rule_of
 from .answer import Answer
 from .cause_answer import LEVEL_HEADS
 from .contact_clouds import contacts_sentence
+from .sections import Demand
 
 _COLOURS = {
     'identified': 'green',

@@ -31,9 +31,9 @@ from weld_twin_nodes.cli.given import PAGE, Given, inputs_of, refuse_unknown_eff
 from weld_twin_nodes.offline.set_up_changes import SetUpChange, set_up_change, with_changes
 
 from ...report import print_summary
-from ...report.acceptance import Demand
 from ...report.diagnosis_files import PDF, RESULT, browser, print_page, write_results
 from ...report.diagnosis_page import Sheet, joint_labels
+from ...report.sections import Demand
 
 LINES = 'WELD_TWIN_PROGRESS'
 """Variable of the environment: 'lines' has every step told as a line on stderr."""

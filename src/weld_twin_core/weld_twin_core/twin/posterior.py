@@ -193,7 +193,7 @@ class Posterior:
             known = shared @ np.linalg.pinv(square[np.ix_(given, given)], hermitian=True)
             theirs = known @ (what.fitted()[given] / size[given])
             variance = np.diag(square[here, here] - known @ shared.T) + theirs**2
-            return size[here] * np.sqrt(np.maximum(variance, 0.0))
+            return np.asarray(size[here] * np.sqrt(np.maximum(variance, 0.0)))
         return np.zeros(effect.fit.coordinates().size)
 
     def of_the_arm(self) -> Posterior:

@@ -32,6 +32,7 @@ TURN = {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 1e-3, 0.0]}
 EXAMPLES = {
     'friction': {**ELBOW, 'windup': 5e-3, 'asymmetry': 0.3, 'travel': 0.05},
     'loaded_play': {**ELBOW, 'width': 5e-3, 'torque': 2.0},
+    'stiffening': {**ELBOW, 'compliance': 1e-4, 'torque': 2.0},
     'bearing_tilt': {**ELBOW, 'lean': [1e-3, 2e-3, -1e-3, 3e-3], 'second': [1e-4, 0, 2e-4, -1e-4]},
     'frame_curve': {'xyz': [1e-3, 0, 0, 2e-3, 0, -1e-3], 'knots': [0.0, 0.8]},
     'gear_ratio_by_direction': {**ELBOW, 'difference': 2e-3, 'travel': 0.05},

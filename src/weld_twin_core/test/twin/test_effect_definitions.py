@@ -167,6 +167,13 @@ def loaded_play(cell):
     cell.q[1] += 0.5 * 2e-3 * np.sin(np.arctan2(torque, 5.0))
 
 
+def stiffening(cell):
+    pull = cell.textbook.load_torque(cell.robot, cell.q, cell.wrench)[1]
+    # The windup x of a gear whose torque is (x + x^3 / x0^2) / compliance, as a root.
+    roots = np.roots([1.0 / (2e-5 * 10.0) ** 2, 0.0, 1.0, -2e-5 * pull])
+    cell.q[1] += roots[np.abs(roots.imag).argmin()].real
+
+
 def bearing_tilt(cell):
     angle, standard = cell.q[0], cell.robot.convention == 'standard'
     x, y = 2e-3 * np.cos(angle) + 1e-3 * np.sin(angle), 3e-3 * np.sin(angle)
@@ -318,6 +325,7 @@ DEFINITIONS = {
     'link_warm_up': ({'joint': 'j2', 'strain': 1e-3, 'warming_time': 2.0}, link_warm_up),
     'drift': ({'xyz_rate': SMALL}, drift),
     'loaded_play': ({'joint': 'j1', 'width': 2e-3, 'torque': 5.0}, loaded_play),
+    'stiffening': ({'joint': 'j1', 'compliance': 2e-5, 'torque': 10.0}, stiffening),
     'bearing_tilt': (
         {'joint': 'j0', 'lean': [2e-3, 1e-3, 0.0, 3e-3], 'second': [0.0, -4e-4, 5e-4, 0.0]},
         bearing_tilt,
@@ -573,10 +581,29 @@ def test_a_link_that_follows_a_temperature_grows_as_it_does(arm, make_recording)
             effect('link_warm_up', joint='j2', follows=wrong).check(arm)
 
 
+def test_drives_that_all_trail_alike_look_like_a_late_clock_and_its_remedy_says_so(ur5):
+    t = np.arange(0.0, 8.0, 0.01)
+    q = 0.4 * np.sin(0.8 * t[:, None] + np.arange(6.0)) + [0.1, -1.2, 1.5, -1.0, -1.4, 0.3]
+    recording = Recording('slow', JointMotion(t, q))
+    at = t[100:]  # the lag has settled
+    late = effect('time_delay', delay=0.015)
+    trailing = [effect('servo_lag', joint=j, time_constant=0.015) for j in ur5.joint_names]
+    nominal, one, other = (
+        Twin(ur5, causes).poses(recording, at).position for causes in ((), [late], trailing)
+    )
+    assert np.abs(one - other).max() < 0.01 * np.abs(one - nominal).max()
+    assert 'drives that all trail by as much look the same' in late.remedy(ur5)
+    assert 'trail' not in effect('time_delay', delay=-0.015).remedy(ur5)
+
+
 def test_stations_that_are_only_counted_show_no_warm_up(arm, make_recording):
     stations, kind = make_recording(arm, 30, static=True), REGISTRY['link_warm_up']
-    counted = JointMotion(np.arange(30.0), stations.joints.q, static=True)
-    for motion, reason in ((stations.joints, None), (counted, 'the stations carry no times')):
+    counted, timed = (
+        JointMotion(apart * np.arange(30.0), stations.joints.q, static=True)
+        for apart in (1.0, 40.0)
+    )
+    untold = 'the stations carry no times'
+    for motion, reason in ((stations.joints, None), (counted, untold), (timed, None)):
         view = Twin(arm).evaluate(Recording('stations', motion)).view
         assert kind.applicable(view, 'j2') == reason
 

@@ -23,6 +23,7 @@ ENTRIES = {
     'hysteresis': {'joint': 'j2', 'amplitude': 1e-3, 'travel': 0.2},
     'friction': {'joint': 'j2', 'windup': 5e-3, 'asymmetry': -0.2, 'travel': 0.1},
     'loaded_play': {'joint': 'j1', 'width': 1e-4, 'torque': 20.0},
+    'stiffening': {'joint': 'j1', 'compliance': 1e-6, 'torque': 20.0},
     'bearing_tilt': {
         'joint': 'j1',
         'lean': [1e-3, 2e-3, 3e-3, -1e-3],

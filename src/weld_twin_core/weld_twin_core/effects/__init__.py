@@ -20,7 +20,7 @@ Examples
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .backlash import Backlash, LoadedPlay
+from .backlash import Backlash, LoadedPlay, Stiffening
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
 from .clocks import ClockRate, TimeDelay
@@ -94,6 +94,7 @@ __all__ = [
     'SetupSettling',
     'SetupStep',
     'Stage',
+    'Stiffening',
     'ThermalGrowth',
     'TimeDelay',
     'ToolPose',

@@ -17,10 +17,21 @@ of its command, instead of behind. That is ``form: coast``, play mirrored about 
 Loaded play is lost motion on the loaded flank, theta -> theta + width / 2 * tau / sqrt(tau^2 + T^2).
 A gear with play and a load on it lies on the flank that the load pulls it to, whichever way it
 moves; it changes over where the load changes sign, within the torque T that friction holds.
+
+A stiffening spring looks like it and is none: strain-wave and cycloidal gears are soft under a small
+load and stiff under a large one, as more and more teeth bear it. Their torque is a cubic of the
+windup [1]_, tau / T = x / x0 + (x / x0)^3 with x0 = compliance T.
+
+References
+----------
+.. [1] T. D. Tuttle and W. P. Seering, "A nonlinear model of a harmonic drive gear transmission",
+   IEEE Trans. Robotics and Automation 12(3), 1996.
+
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -36,8 +47,10 @@ from .associative_scan import last_true, play
 from .curves import load
 from .effect import Effect, LinearEffect, MemoryEffect
 from .hooks import FitHooks, Hooked, SearchHooks, Traits
+from .joint_compliance import JointCompliance
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 _FORMS = ('play', 'reversal', 'coast')
 _CLOSED = 1e-5
@@ -184,9 +197,6 @@ def _reversals(q: Array, state: Any) -> tuple[Array, Any]:
     return flips, (q[..., -1], latest[..., -1])
 
 
-_SHARES = (0.03, 0.15)
-"""Torques at which the flank is certain that a search starts from, in the largest load seen."""
-
 _CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
 
@@ -197,13 +207,53 @@ class _LoadedSearch(SearchHooks):
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
         """Yield play of a gear that slides easily, where the load keeps it on one flank."""
         torque = load(view, view.robot.index(str(joint)))
-        friction = _SHARES[0] * float(np.abs(torque).max(initial=0.0))
+        friction = self.kind.shares[0] * float(np.abs(torque).max(initial=0.0))
         if friction > 0.0 and not _changes(torque, friction):
             yield self.kind(str(joint), 0.0, friction)
 
 
+class _BentByLoad(LinearEffect):
+    """What a joint does under its load torque, along a curve that bends at ``torque`` [N m]."""
+
+    joint: str
+    torque: float
+
+    of = 'joint'
+    stage = Stage.LINK
+    options = ('torque',)
+    needs = frozenset({'load'})
+    shares = (0.03, 0.15)
+    """Torques that a search starts from, in the largest load seen."""
+
+    def check(self, robot: Robot) -> None:
+        """Refuse a curve without a bend: it would jump."""
+        super().check(robot)
+        if not float(self.torque) > 0.0:
+            raise ModelError(f'{self.name}: torque must be above zero, got {self.torque!r}')
+
+    @abstractmethod
+    def bent(self, pull: Array) -> Array:
+        """Return what a load, any shape, does to the joint where the one parameter is one."""
+
+    def per_unit(self, view: View) -> list[Shift]:
+        i = view.robot.index(self.joint)
+        return [{('q', i): self.bent(load(view, i))}]
+
+    @classmethod
+    def seeds(
+        cls: type[Any], view: View, joint: str | None, pull: Array | None = None
+    ) -> Iterable[Effect]:
+        """Yield curves that bend under a small load and under a larger one."""
+        torque = load(view, view.robot.index(str(joint)))
+        most = float(np.abs(torque).max(initial=0.0))
+        for share in cls.shares:
+            # Where the load stays on one side, so does the flank, and that is an offset.
+            if most > 0.0 and _changes(torque, share * most):
+                yield cls(str(joint), 0.0, share * most)
+
+
 @register
-class LoadedPlay(LinearEffect):
+class LoadedPlay(_BentByLoad):
     """Play of full ``width`` whose side the load decides; ``torque`` [N m] is what friction holds."""
 
     joint: str
@@ -221,8 +271,6 @@ class LoadedPlay(LinearEffect):
         common=False,
         by_motion=True,
     )
-    of = 'joint'
-    stage = Stage.LINK
     parameters = (
         Parameter('width', 'rad', typical=5e-4, lower=0.0)
         .plausible((5e-4, 0.0, 2e-2), f'{RV}; see backlash')
@@ -230,35 +278,51 @@ class LoadedPlay(LinearEffect):
             (5e-5, 0.0, 5e-3), 'derived: nuts have hundredths of a millimetre of play'
         ),
     )
-    options = ('torque',)
-    needs = frozenset({'load'})
     search = Hooked(_LoadedSearch)
 
-    def check(self, robot: Robot) -> None:
-        """Refuse a gear that friction does not hold at all: its flank would jump."""
-        super().check(robot)
-        if not float(self.torque) > 0.0:
-            raise ModelError(f'loaded_play: torque must be above zero, got {self.torque!r}')
-
-    def per_unit(self, view: View) -> list[Shift]:
-        i = view.robot.index(self.joint)
-        pull = load(view, i)
-        return [{('q', i): 0.5 * pull / np.hypot(pull, self.torque)}]
-
-    @classmethod
-    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """Yield play of a gear that slides easily, and of one that sticks."""
-        torque = load(view, view.robot.index(str(joint)))
-        most = float(np.abs(torque).max(initial=0.0))
-        for share in _SHARES:
-            # Where the load stays on one side, so does the flank, and that is an offset.
-            if most > 0.0 and _changes(torque, share * most):
-                yield cls(str(joint), 0.0, share * most)
+    def bent(self, pull: Array) -> Array:
+        return np.asarray(0.5 * pull / np.hypot(pull, self.torque))
 
     def remedy(self, robot: Robot) -> str:
         return (
             f'Service or preload the gear of {self.site}: its load lays it on one flank or the other '
             f'of {self._travelled(robot, self._plain("width"))} of play.'
+        )
+
+
+@register
+class Stiffening(_BentByLoad):
+    """The joint yields by ``compliance`` under a small load and by less under ``torque`` [N m]."""
+
+    joint: str
+    compliance: Value = 0.0
+    torque: float = 1.0
+
+    name = 'stiffening'
+    traits = Traits(
+        title='stiffening spring',
+        meaning='a joint gives way under load, ever less the more it bears',
+        formula='θ → θ + x, x + x³ / (compliance · torque)² = compliance · τ, τ the load torque: a '
+        'gear that is soft under a small load and stiff under a large one',
+        entered='program',
+        depends_on='load',
+        changes_in_use=True,
+        common=False,
+        by_motion=True,
+    )
+    parameters = JointCompliance.parameters
+    shares = (0.1, 0.5)
+
+    def bent(self, pull: Array) -> Array:
+        third = np.arcsinh(1.5 * np.sqrt(3.0) * pull / self.torque) / 3.0
+        return np.asarray(2.0 / np.sqrt(3.0) * self.torque * np.sinh(third))
+
+    def remedy(self, robot: Robot) -> str:
+        return (
+            f'Compensate the yielding of {self.site} under load by a curve: it is softest under a '
+            f'small load, and stiffens from about {size(float(self.torque))} '
+            f'{"N" if self.on_slide(robot) else "N m"} on. If that is new, look for play in its gear: '
+            'with a spring it does nearly the same.'
         )
 
 

@@ -52,9 +52,11 @@ class TimeDelay(Effect):
     def remedy(self, robot: Robot) -> str:
         delay = self._plain('delay')
         order = 'late' if delay > 0.0 else 'early'
+        # A lag is a delay but for its square times half the acceleration, which hardly ever shows.
+        alike = ' If joints are commands: drives that all trail by as much look the same.'
         return (
             f'Fix the clock: the measurements are stamped {size(delay * 1e3)} ms {order} against the '
-            'joint states; synchronise both computers or subtract the delay.'
+            f'joint states; synchronise both computers or subtract the delay.{alike * (delay > 0.0)}'
         )
 
 

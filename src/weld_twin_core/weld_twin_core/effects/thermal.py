@@ -125,8 +125,8 @@ _CONSTANTS = (0.15, 0.6, 2.5)
 """Time constants that a search starts from, in lengths of the recording: beyond, it is a ramp."""
 _WARMER = 1.0
 """Kelvin by which a temperature must vary to be followed: sensors wander by some tenths."""
-_EVEN = 1e-6
-"""Share of their spacing by which stamps of stations differ where they are only counted."""
+_NUMBERED = 1e-6
+"""By how much [s] stamps of stations are further apart than one where they are row numbers."""
 
 
 class _Fit(FitHooks):
@@ -243,6 +243,5 @@ class LinkWarmUp(Effect):
 
 
 def _counted(t: Array) -> bool:
-    """Tell whether stamps of stations, shape (M,), are no more than their numbers."""
-    apart = np.diff(t)
-    return apart.size < 2 or bool(np.ptp(apart) <= _EVEN * np.abs(apart).max())
+    """Tell whether stamps of stations, shape (M,), are row numbers, as tables without times have."""
+    return t.size < 3 or bool(np.abs(np.diff(t) - 1.0).max() <= _NUMBERED)

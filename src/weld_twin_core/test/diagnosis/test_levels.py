@@ -236,7 +236,7 @@ def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
     )
     assert told.status == 'unknown'
     assert (told.causes[0].place[0][0], told.causes[0].dependence[0][0]) == ('instrument', 'place')
-    assert told.unexplained.structure[0] == 'instrument, depending on place'
+    assert told.unexplained.structure[0] == 'place at instrument'
     assert sum(share for _, share in told.where.joints) < 0.5 * told.causes[0].share
 
 
@@ -307,7 +307,7 @@ def test_what_is_left_beside_a_model_has_a_place_where_no_curve_explains_the_gap
     )
     form = placed(SimpleNamespace(dense=False), Verdict('unknown'), None, evidence, wt.Beliefs())
     (part,) = form.parts
-    assert (form.gain, form.steady, str(part.group)) == (0.6, 5.0, 'elbow, depending on angle')
+    assert (form.gain, form.steady, str(part.group)) == (0.6, 5.0, 'angle at elbow')
     # What nothing takes off may be anywhere.
     assert part.weight_of('at') == pytest.approx({'elbow': 0.6 / 1.1, 'wrist': 0.1 / 1.1})
     noise = replace(evidence, structure=replace(evidence.structure, gain=0.01))

@@ -28,13 +28,13 @@ from weld_twin_core.diagnosis.soundness.richness import (
 )
 from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
-from weld_twin_core.diagnosis.soundness.stamps import _stream, written
+from weld_twin_core.diagnosis.soundness.stamps import _stream, clocks, written
 from weld_twin_core.diagnosis.soundness.stuck import _inside
 from weld_twin_core.diagnosis.soundness.suspicions import doubles, suspicions, turned_bases
 from weld_twin_core.diagnosis.soundness.touches import _moved_run
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion
+from weld_twin_core.recording import JointMotion, Recording
 
 ELBOW = np.array([1.0, 1.0, np.degrees(1.0), 1.0, 1.0, 1.0])
 """Columns of joints, the elbow's in degrees."""
@@ -454,3 +454,25 @@ def test_stations_that_are_there_twice_are_counted(ur5, rng):
 
 def test_names_are_listed_as_people_do():
     assert [listed(list('abc')[:k]) for k in (1, 2, 3)] == ['a', 'a and b', 'a, b and c']
+
+
+def test_drives_that_trail_by_times_of_their_own_are_no_clock_that_drifts(ur5, rng):
+    motion = moving(ur5, rng)
+    trails = (0.004, 0.012, 0.02, 0.008, 0.008, 0.008)
+    late = np.stack(
+        [np.interp(motion.t - by, motion.t, q) for by, q in zip(trails, motion.q.T, strict=True)],
+        axis=1,
+    )
+    real = recorded(ur5, JointMotion(motion.t, late), rng, points=True)
+    problem, model = asked(ur5, Recording('run', motion, real.measured), align=('base',))
+    case = Case(problem, model)
+    vars(case)['lags'] = [Lag(0.009, -9e-4, 10.0, before=5e-3, after=2e-3)]
+    assert not list(clocks(case))
+    # Of a clock that does drift they explain no more than it does.
+    t = real.measured.t
+    drifting = Recording('run', motion).with_measured(
+        replace(recorded(ur5, motion, rng, points=True).measured, t=t + 5e-3 + 9e-4 * t)
+    )
+    case = Case(*asked(ur5, drifting, align=('base',)))
+    vars(case)['lags'] = [Lag(0.014, 9e-4, 10.0, before=5e-3, after=1e-4)]
+    assert [item.kind for item in clocks(case)] == ['clock']

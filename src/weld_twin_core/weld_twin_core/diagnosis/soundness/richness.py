@@ -209,7 +209,7 @@ def outliers(case: Case) -> Iterator[Finding]:
             continue
         worst = int(off.argmax())
         at = recording.seen.t[worst]
-        where = f'station {worst}' if recording.joints.static else f't = {at:.3f} s'
+        where = f'station {worst + 1}' if recording.joints.static else f't = {at:.3f} s'
         yield Finding(
             'warning' if bad.mean() > FEW else 'note',
             f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '

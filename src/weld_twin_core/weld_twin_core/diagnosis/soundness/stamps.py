@@ -19,9 +19,9 @@ from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned
 from .evidence import Case, Finding, mistake, note, warning
-from .lag import Lag
+from .lag import KEPT, Lag
 from .lengths import falls, listed
-from .limits import CLEAR, ENOUGH, FEW, HALVED, LATE, MOVED, NOISE, TINY
+from .limits import CLEAR, ENOUGH, FEW, HALVED, LATE, MOVED, NOISE, TINY, WORTH
 from .mending import Given, Mend, stamped_evenly, stamps_as, velocities_left_out
 
 
@@ -199,8 +199,20 @@ def written(values: Array) -> float:
 def clocks(case: Case) -> Iterator[Finding]:
     """Yield how late the measurements of a moving arm are, where that explains the gap."""
     for k, late in enumerate(case.lags):
-        if late is not None:
+        if late is not None and _by_drives(case, k) > WORTH * late.after:
             yield from _late_by(case, late, k)
+
+
+def _by_drives(case: Case, k: int) -> float:
+    """Return the gap, RMS [m], that is left where every drive trails by a time of its own."""
+    few, _ = case.rest
+    maker, off = few.features(case.model)[k], few.residuals(case.model)[k][:3]
+    trails = [maker.column(('q', i))[:3] * qd for i, qd in enumerate(maker.view.qd.T)]
+    frame = [maker.column(('base', i))[:3] for i in range(6)]
+    columns = np.reshape([*frame, *trails], (len(frame) + len(trails), -1))
+    x = np.linalg.lstsq(columns.T, off.ravel(), rcond=None)[0]
+    remaining = np.sort(((off.ravel() - x @ columns).reshape(off.shape) ** 2).sum(axis=0))
+    return float(np.sqrt(remaining[: max(int(KEPT * remaining.size), 1)].mean()))
 
 
 def _late_by(case: Case, lag: Lag, k: int) -> Iterator[Finding]:

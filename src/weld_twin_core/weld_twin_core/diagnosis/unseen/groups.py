@@ -94,7 +94,7 @@ class Group:
 
     def __str__(self) -> str:
         """Return it as people read it."""
-        return f'{self.at}, depending on {self.on}' if self.on != 'constant' else self.at
+        return f'{self.on} at {self.at}' if self.on not in ('constant', self.at) else self.at
 
 
 def all_groups(

@@ -173,7 +173,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
     told = [(one, g) for one, g in found if one.share > least and one.steady > certain][:TOLD]
-    names = tuple(f'{group.on} at {group.at}' for _, group in told)
+    names = tuple(str(group) for _, group in told)
     of_rest = {(group.at, group.on): one.share for one, group in reversed(told)}
     chance = 0.0
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure

@@ -207,7 +207,8 @@ def test_what_one_stretch_alone_shows_stays_put_elsewhere():
     np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)
 
 
-def test_a_gap_that_is_carried_without_a_model_keeps_its_size():
+@pytest.mark.parametrize('times', [2.0, 0.97])  # worse, and hardly better
+def test_a_gap_that_is_carried_without_a_model_keeps_its_size(times):
     """The frames alone were fitted while the whole gap counted as noise; then noise is known."""
     problem, model = tiny(TRUE, count=40, align=('base',), turned=False)
     result = search(problem, model, tuple(REGISTRY), Beliefs(), lambda text: None)
@@ -215,7 +216,7 @@ def test_a_gap_that_is_carried_without_a_model_keeps_its_size():
     position = problem.residuals(result.baseline.model)[0][:3]
     gap = np.sqrt((position**2).sum(axis=0).mean())
     unseen = Unseen.of(problem, result.scale, result.final, result.precision)
-    worse = Shrink(gap, 2.0 * gap, 2.0, (1.0, 3.0), 'stretches')
+    worse = Shrink(gap, times * gap, times, (1.0, 3.0), 'stretches')
     case = result, unseen, worse, Verdict('unknown'), None, (), Beliefs()
     _, unseen, shrink, _ = carried(*case)
     assert unseen.rms(unseen.residual) == pytest.approx(gap)

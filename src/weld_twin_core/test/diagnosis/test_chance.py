@@ -34,6 +34,20 @@ def test_a_sound_arm_at_fifteen_stations_has_nothing_but_noise(seed):
     robot, recording = stations(seed)
     found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
     assert found.status == 'none' and not found.effects and not found.families
+    # And no program is moved by what the noise allows.
+    assert found.posterior.centred(())[0] == ()
+
+
+@pytest.mark.parametrize('times', [15.0, 60.0])
+def test_a_sound_arm_with_four_stray_readings_is_sound_and_they_are_named(times):
+    robot, recording = stations(7, count=60)
+    points, strays = np.array(recording.measured.position), [3, 17, 40, 58]
+    points[strays] += times * NOISE * np.array([[1, 1, -1], [-1, 1, 1], [1, -1, 1], [1, 1, 1]])
+    seen = wt.Measurements(recording.joints.t, points)
+    told = wt.diagnose(recording.with_measured(seen), robot, align='base,tool', experiment=False)
+    assert told.status == 'none'
+    named = 'station 4, station 18, station 41, station 59' in told.reasons[0]
+    assert named or not told.traces.trusted[0][strays].any()
 
 
 def test_a_zero_that_is_off_is_found_at_as_many():
@@ -41,6 +55,28 @@ def test_a_zero_that_is_off_is_found_at_as_many():
     found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
     assert found.status in ('identified', 'ambiguous')
     assert 'elbow_joint' in {effect.effect.site for effect in found.effects}
+
+
+def test_many_small_errors_do_better_than_one_by_more_than_chance_or_not_at_all():
+    robot, recording = stations(48, [wt.effects.JointOffset('wrist_1_joint', 9e-4)], 10)
+    found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
+    assert not found.families
+    assert [effect.effect.site for effect in found.effects] == ['wrist_1_joint']
+    assert found.gap.noise_floor_m > 0.5 * NOISE
+
+
+@pytest.mark.parametrize('share', [0.2, 0.4])
+def test_a_gear_that_stiffens_under_its_load_is_no_play(share):
+    """Its compliance falls to a half at a share of the largest load, as of no library effect."""
+    joint, robot = 'shoulder_lift_joint', wt.load('ur5')
+    load, halved = np.linspace(-65.0, 65.0, 41), 65.0 * share
+    gear = wt.effects.JointCurve(
+        joint, 3e-5 * load / (1.0 + np.abs(load) / halved), load, over='load'
+    )
+    _, recording = stations(9, [gear], 60)
+    found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
+    assert 'stiffening' in {site.effect for site, _ in found.causes[0].name}
+    assert not any(e.effect.name == 'loaded_play' for e in found.effects)
 
 
 def groups(count, rows):

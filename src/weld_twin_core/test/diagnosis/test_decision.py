@@ -290,7 +290,7 @@ def test_what_depends_on_nothing_looked_at_is_said_so():
 def test_nothing_found_and_nothing_left_is_none():
     verdict = decide(evidence(gap=FLOOR))
     assert (verdict.status, verdict.sets) == ('none', ())
-    assert verdict.reasons == ('the gap does not rise above the noise',)
+    assert verdict.reasons == ('there is no gap above the noise',)
 
 
 @pytest.mark.parametrize(('times', 'status'), [(1.31, 'unknown'), (1.29, 'none')])
@@ -314,6 +314,23 @@ def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
     assert ('far wider' in verdict.reasons[0]) is (status == 'unknown')
 
 
+@pytest.mark.parametrize(('but_for', 'status'), [(1.29, 'none'), (1.31, 'unknown')])
+@pytest.mark.parametrize('independent', [True, False])
+def test_readings_that_stand_out_are_no_gap_where_noise_is_left_without_them(
+    but_for, status, independent
+):
+    wide = evidence(gap=2.5 * FLOOR, after=2.5 * FLOOR, independent=independent)
+    strays = ('station 4', 'station 18')
+    verdict = decide(replace(wide, strays=strays, but_for=but_for * FLOOR))
+    assert verdict.status == status
+    assert ('those at station 4, station 18 do' in verdict.reasons[0]) is (status == 'none')
+
+
+def test_readings_that_stand_out_hide_no_structure():
+    told = structured(0.5, gap=1e-4, strays=('station 4',), but_for=FLOOR)
+    assert decide(told).status == 'unknown'
+
+
 # Many small errors ------------------------------------------------------------------------------
 
 
@@ -324,6 +341,12 @@ def family(effect, rms=3e-5, size=1e-4, growths=(0.5, 0.5), like=(), chosen=True
 
 def of_families(*families, **changes):
     return decide(structured(0.0, families=families, believed=(0.9,), **changes))
+
+
+def test_many_small_errors_that_explain_nothing_are_none():
+    noise = {'gap': FLOOR, 'after': FLOOR}
+    verdict = of_families(family('link_length', growths=(0.0, -0.1)), **noise)
+    assert (verdict.status, verdict.families) == ('none', ())
 
 
 @pytest.mark.parametrize(

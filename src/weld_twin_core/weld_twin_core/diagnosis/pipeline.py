@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from math import sqrt
 
 from ..arm.robot import Robot
 from ..effects.effect import Effect
 from ..recording import Recording
 from .advice import Limits
+from .algebra.fit import LEAST_NOISE, NOISE_TRUST
 from .algebra.noise_floor import noise_floor
 from .algebra.open_directions import held
 from .algebra.problem import frames_named
@@ -199,7 +201,10 @@ def _told(
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     leftover = structure(unseen, result.final.model, result.baseline, beliefs)
     progress('looked for what is left')
-    floor = noise_floor(result.problem, result.problem.residuals(result.final.model))
+    residuals = result.problem.residuals(result.final.model)
+    # As many coordinates as rows leave nothing of a noise that is there all the same.
+    expected = LEAST_NOISE * sqrt(NOISE_TRUST / result.problem.size) if result.dense else 0.0
+    floor = noise_floor(result.problem, residuals, expected)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     families = weighed_families(result, unseen, beliefs) if result.dense else None
     evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs)

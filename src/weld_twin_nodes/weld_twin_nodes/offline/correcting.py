@@ -189,6 +189,8 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
     remaining = [e.name for e in model.effects if e not in model.acting]
     if remaining:
         out.append(f'no program mends {", ".join(remaining)}')
+    if not model.acting:
+        out.append('the model has nothing that a program could mend, and no point was moved')
     if model.posterior is None:
         out.append(NOT_SURE)
     elif frames := model.posterior.directions.frames:

@@ -218,8 +218,9 @@ def _without(diagnosis: Diagnosis) -> str:
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:
+    reason, *_ = (*diagnosis.reasons, 'there is no gap above the noise')
     first = (
-        f'There is no gap above the noise: measured and model differ by '
+        f'{reason[0].upper()}{reason[1:]}. Measured and model differ by '
         f'{millimetres(diagnosis.gap.rms_m)}, of which {millimetres(diagnosis.gap.noise_floor_m)} '
         'is noise.'
     )

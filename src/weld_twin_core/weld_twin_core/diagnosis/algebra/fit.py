@@ -340,19 +340,21 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
     few: outliers that may be left out however few samples there are.
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
-    aside = max(few, int(SET_ASIDE * every.size), _strays(weights))
+    far = sum(int(part.sum()) for part in strays(weights, (HUBER / STRAY) ** 2))
+    aside = max(few, int(SET_ASIDE * every.size), far)
     least = float(np.sort(every)[aside]) if every.size > aside else 0.0
     return [weight >= min(TRUSTED, least) for weight in weights]
 
 
-def _strays(weights: Sequence[Array]) -> int:
-    """Return how many samples are strays; 0 where they are too many, or too many in a row."""
-    result, in_a_row = [weight < (HUBER / STRAY) ** 2 for weight in weights], 0
+def strays(weights: Sequence[Array], least: float = TRUSTED) -> list[NDArray[np.bool_]]:
+    """Return which samples of less weight stray; none where too many do, or too many in a row."""
+    result, in_a_row = [weight < least for weight in weights], 0
     for stray in result:
         runs = np.diff(np.flatnonzero(np.concatenate([[True], ~stray, [True]]))) - 1
         in_a_row = max(in_a_row, int(runs.max()))
     count, samples = sum(int(stray.sum()) for stray in result), sum(part.size for part in result)
-    return count if in_a_row <= STRAYS_TOGETHER and count <= STRAYS * samples else 0
+    few = in_a_row <= STRAYS_TOGETHER and count <= STRAYS * samples
+    return [part & few for part in result]
 
 
 def robust_fit(

@@ -39,29 +39,30 @@ class NoiseFloor(NamedTuple):
         return self.sigma * float(np.sqrt(3.0))
 
 
-def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
+def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) -> NoiseFloor:
     """
     Return the noise of one measured coordinate, and whether it is independent of any model.
 
     residuals: of the best model at hand, shape (c, M). What it leaves bounds the floor from above;
     repeated stations and third differences in time, where the data have them, are not touched by
     its faults.
+    least: noise of a coordinate [m] that is believed all the same, where many coordinates take it up.
     """
     estimates = []
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = measured_axes(part[:3])
-        remaining = spread_of(position)
+        remaining = max(spread_of(position), least)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
         if direct is None and recording.measured is not None:
-            sigma = recording.measured.sigma
-            direct = None if sigma is None else float(np.median(sigma))
+            reported = recording.measured.sigma
+            direct = None if reported is None else float(np.median(reported))
             independent = False
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3.0))
-        least = min(remaining, WIDEST) if direct is None else min(direct, remaining)
-        estimates.append((share * least, part.shape[1]))
+        sigma = min(remaining, WIDEST) if direct is None else min(direct, remaining)
+        estimates.append((share * sigma, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)
 

@@ -101,14 +101,16 @@ def carried(
     result, unseen, shrink: of the effects found.
     alternative: the free-form explanation; carried where the verdict is 'unknown' and it predicts
     as well. What makes unseen data worse than the nominal robot does is not carried at all, nor
-    told.
+    told; nor is what has no name and makes them hardly better, which would move points for nothing.
     """
-    if verdict.status != 'unknown':
+    nothing = result.dense and verdict.status == 'none'
+    if verdict.status != 'unknown' and not nothing:
         return result, unseen, shrink, verdict
     if alternative is not None and _worth(unseen, alternative, verdict, beliefs):
         result, unseen = alternative.found, alternative.unseen
         shrink = held_out_shrink(result, unseen, holdout, beliefs)
-    if shrink.rms_after_m <= shrink.rms_before_m:
+    least = 1.0 if verdict.sets else beliefs.better
+    if shrink.rms_after_m <= least * shrink.rms_before_m and not nothing:
         return result, unseen, shrink, verdict
     # Without a name there is no reason to carry what makes unseen data worse.
     # The frames alone were fitted when the noise was not known yet.

@@ -4,11 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
+from ...recording import Recording
+from ..algebra.fit import strays
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -57,8 +62,21 @@ def gathered(
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
+        strays=_named(recordings, strays(result.scale.weights)),
+        but_for=unseen.rms_but_for_strays(),
         scattered=scattered(result, unseen, beliefs),
         stations=any(recording.joints.static for recording in recordings),
+    )
+
+
+def _named(
+    recordings: Sequence[Recording], strays: Sequence[NDArray[np.bool_]]
+) -> tuple[str, ...]:
+    """Return where readings stand out, as people count: stations from one."""
+    return tuple(
+        f'station {k + 1}' if own.joints.static else f't = {own.seen.t[k]:.2f} s'
+        for own, part in zip(recordings, strays, strict=True)
+        for k in np.flatnonzero(part)
     )
 
 

@@ -65,27 +65,29 @@ def fitted_together(
         if remains < beliefs.better * remaining:
             best, remaining = trial, remains
     few = unseen_rms(result)
-    if not (result.final.model.found or result.crowded) and _by_chance(result, best):
+    several = len(result.final.model.found) >= beliefs.several
+    chance = not (result.crowded or several) and _by_chance(result, best)
+    if chance and not result.final.model.found:
         return result
     # Several that were chosen on the parts left out as well have their lead by that.
-    chosen = len(result.final.model.found) >= beliefs.several and _relearned(best)
-    if result.crowded or remaining < (1.0 if chosen else beliefs.better) * few:
+    chosen = several and _relearned(best)
+    if not chance and (result.crowded or remaining < (1.0 if chosen else beliefs.better) * few):
         return best
     return replace(result, many=best) if remaining < CHOSEN * few else result
 
 
-def _by_chance(none: Search, many: Search) -> bool:
-    """Return whether many small errors predict no more of few stations than they would of noise."""
-    fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
-    share = 1.0 - (unseen_rms(many) / max(unseen_rms(none), 1e-12)) ** 2
+def _by_chance(few: Search, many: Search) -> bool:
+    """Return whether many errors predict no more of what a few leave than they would of noise."""
+    fitted, own = (Unseen.of(s.problem, s.scale, s.final, s.precision) for s in (many, few))
+    share = 1.0 - (unseen_rms(many) / max(unseen_rms(few), 1e-12)) ** 2
     if not may_be_chance(fitted.residual.size, share):
         return False
     columns, frames = fitted.columns.written_out(), fitted.frames
     size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
     # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
     tried = Candidates(
-        columns[:frames],
-        fitted.precision[:frames],
+        own.columns.written_out(),
+        own.precision,
         [columns[frames:] / size[frames:]],
         LEARNED,
         ways_to_divide(many.problem),

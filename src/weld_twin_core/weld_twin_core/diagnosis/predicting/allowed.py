@@ -95,7 +95,8 @@ def allowed(
         left_open(problem, model),
         prior_std=prior.width,
         single=Conditioning(rows, prior, prior.width, models.noise).given(),
-        middle=1.0,
+        # Where nothing was found nothing was judged on unseen data, and nothing is corrected.
+        middle=float(bool(model.found)),
     )
     return _with_usual_sigma(posterior, model, problem)
 

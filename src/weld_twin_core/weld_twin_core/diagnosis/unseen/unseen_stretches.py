@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
-from ..algebra.fit import Fit, frame_prior, trusted
+from ..algebra.fit import TRUSTED, Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
@@ -334,6 +334,11 @@ class Unseen:
     def rms(self, residual: Array) -> float:
         """Return the RMS position error over trusted samples, [m]."""
         return float(np.sqrt(self.squares(residual).mean()))
+
+    def rms_but_for_strays(self) -> float:
+        """Return the RMS position error that the model leaves where no reading stands out, [m]."""
+        kept = self._trusted_weights >= TRUSTED
+        return float(np.sqrt(self.squares(self.whole)[kept].mean()))
 
     def turn_rms(self, residual: Array) -> float | None:
         """Return the RMS orientation error over trusted samples [rad], None without any."""

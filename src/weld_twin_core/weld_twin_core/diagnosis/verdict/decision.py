@@ -24,6 +24,8 @@ LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
 TINY = 1e-18
 """Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
+LISTED = 8
+"""Readings that a sentence tells one by one at the most."""
 _FOREIGN = (
     'where the evidence was like this, a cause that is not in the library was at work more often '
     'than not, and what was found stood in for a part of it'
@@ -193,6 +195,16 @@ def _of_nothing(remaining: Left) -> Verdict:
     evidence, beliefs = remaining.evidence, remaining.beliefs
     if evidence.refused or evidence.lacking:
         return Verdict('unknown', (), (_absurd(evidence),))
+    but_for = replace(remaining, evidence=replace(evidence, after=evidence.but_for))
+    noise = evidence.strays and not remaining.structured and not but_for.rises(beliefs.above)
+    if noise and remaining.rises(beliefs.above):
+        first, others = evidence.strays[:LISTED], len(evidence.strays) - LISTED
+        names = ', '.join(first) + (f' and {others} others' if others > 0 else '')
+        reason = (
+            f'nothing but noise is left where no reading stands out by itself; those at {names} do, '
+            'so measure there again'
+        )
+        return Verdict('none', (), (reason,))
     if remaining.share > beliefs.unexplained and remaining.above_noise:
         return Verdict('unknown', (), (_depends(evidence),))
     if remaining.wide:
@@ -205,10 +217,10 @@ def _of_nothing(remaining: Left) -> Verdict:
     if not evidence.independent and remaining.rises(beliefs.above):
         reason = (
             'nothing is found, but what remains is not spread as noise is, and nothing on these '
-            'recordings shows the noise by itself: repeat some poses'
+            'recordings shows the noise by itself, so repeat some poses'
         )
         return Verdict('none', (), (reason,))
-    return Verdict('none', (), ('the gap does not rise above the noise',))
+    return Verdict('none', (), ('there is no gap above the noise',))
 
 
 def _of_families(remaining: Left) -> Verdict:
@@ -236,6 +248,8 @@ def _of_families(remaining: Left) -> Verdict:
         'whatever the others do in its place'
     )
     whole = Verdict('identified', sets, (reason,), tuple(families))
+    if not sets and remaining.explained <= beliefs.unexplained:
+        return _of_nothing(remaining)
     if not sets:
         return replace(whole, status='unknown', reasons=(reason, _NO_KIND))
     if remaining.explained <= remaining.share:

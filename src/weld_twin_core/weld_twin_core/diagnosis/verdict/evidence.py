@@ -72,6 +72,10 @@ class Evidence:
     """How far every joint moves [rad, m]."""
     stations: bool = False
     """Whether the arm stood still where it was measured, in one of the recordings at least."""
+    strays: tuple[str, ...] = ()
+    """Readings that stand out by themselves, in words,"""
+    but_for: float = 0.0
+    """and ``after`` without them [m]."""
     scattered: tuple[Scatter, ...] = ()
     """Noise that comes from joints beyond doubt, largest first."""
 

@@ -21,6 +21,7 @@ from weld_twin_core.sensitivity import (
     sweep,
     together,
 )
+from weld_twin_core.sensitivity.claims.combined_measures import growth_exponent
 from weld_twin_core.sensitivity.sweep import DEGREE
 
 from ..setting import Setting
@@ -80,7 +81,7 @@ def drift(setting: Setting) -> Drawing:
     for colour, (name, value) in zip(COLOURS, result.items(), strict=False):
         even = np.interp(grid, study.s[order], value[order])
         total = cumulative(even[:, None])
-        power = _power(grid, total)
+        power = growth_exponent(grid, total)
         table[f'{name.replace(" ", "_")}_d_cum_m'] = total
         style = {'color': colour, **_style(name)}
         left.plot(1e3 * grid, total, label=f'{name}: power {power:.2f}', **style)
@@ -95,11 +96,6 @@ def drift(setting: Setting) -> Drawing:
         'per sample it stays what it was, so nothing accumulates.'
     )
     return Drawing('figure-14', caption, table, svg(figure))
-
-
-def _power(path: Array, total: Array) -> float:
-    late = slice(len(path) // 2, None)
-    return float(np.polyfit(np.log(path[late]), np.log(total[late]), 1)[0])
 
 
 def angles(setting: Setting) -> Drawing:

@@ -289,3 +289,13 @@ def test_a_correction_finer_than_the_language_writes_is_none(tmp_path):
         *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml', *OPTIONS['inform']),
     )
     assert said.code == 2 and 'too little is gained' in said.err
+
+
+def test_a_model_with_nothing_to_mend_moves_no_point_and_says_so(tmp_path):
+    said, reaches = a_line_on_which_a_joint_turns_around(tmp_path, [])
+    assert said.code == 0, said.err
+    told = json.loads((tmp_path / 'out' / 'correction.json').read_text())
+    assert any('no point was moved' in note for note in told['notes'])
+    assert [move['moved_m'] for move in told['moves']] == pytest.approx(
+        [0.0] * len(reaches), abs=1e-6
+    )

@@ -14,6 +14,8 @@ from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, hidden, weigh
 
 SMALL = 40
 """Coordinates of one family."""
+NO = np.array([False])
+"""Of the one family that there is: neither of gears nor tied."""
 
 
 def arm(seed, truth, frame_width=1e3):
@@ -24,7 +26,7 @@ def arm(seed, truth, frame_width=1e3):
     residual = truth @ columns[1 : 1 + SMALL] + rng.normal(size=300)
     zero = np.zeros(SMALL + 2)
     group = np.array([-1, *[0] * SMALL, 0])
-    prior = Prior(zero, np.array([frame_width, *[5.0] * (SMALL + 1)]), group, np.array([False]))
+    prior = Prior(zero, np.array([frame_width, *[5.0] * (SMALL + 1)]), group, NO, NO)
     return weighed(Rows(columns, residual, 1.0), prior, 1.0)
 
 
@@ -75,7 +77,7 @@ def test_of_two_errors_that_move_the_tool_alike_the_wrong_one_is_not_told_for_su
         truth = np.where(np.arange(SMALL) % 10 == 0, 1.0, 0.0)
         columns = np.concatenate([rng.normal(size=(1, 300)), own])
         width = np.array([1e3, *[5.0] * SMALL])
-        prior = Prior(np.zeros(SMALL + 1), width, np.array([-1, *[0] * SMALL]), np.array([False]))
+        prior = Prior(np.zeros(SMALL + 1), width, np.array([-1, *[0] * SMALL]), NO, NO)
         rows = Rows(columns, truth @ own + rng.normal(size=300), 1.0)
         known = weighed(rows, prior, 1.0)
         off.append((known.mean[1:] - truth) / np.sqrt(np.diag(known.covariance))[1:])
@@ -128,3 +130,28 @@ def test_a_group_partly_known_is_bounded_by_nothing():
     found, _ = learned_precision(*equations(), labels, scales, believed)
     alone, _ = learned_precision(*equations(), labels, scales)
     np.testing.assert_array_equal(found, alone)
+
+
+@pytest.mark.parametrize(('height', 'low', 'high'), [(0.0, 0.0, 0.25), (2.0, 1.0, 3.0)])
+def test_heights_along_a_curve_have_one_size_and_leave_a_slope_beside_them_as_sure_as_it_is(
+    height, low, high
+):
+    """Seven rows know a height to 0.4; forty of them know how high they are to the fourth root less."""
+    off, sure = [], []
+    place = np.linspace(0.0, 1.0, 300)
+    hats = np.maximum(0.0, 1.0 - np.abs(SMALL * place - np.arange(SMALL + 1)[:, None]))
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        columns = np.concatenate([rng.normal(size=(1, 300)), 5.0 * (place - 0.5)[None], hats])
+        residual = height * rng.normal(size=SMALL + 1) @ hats + rng.normal(size=300)
+        group = np.array([-1, 0, *[1] * (SMALL + 1)])
+        width = np.array([1e3, *[1.0] * (SMALL + 2)])
+        gears, tied = np.array([False, True]), np.array([False, True])
+        prior = Prior(np.zeros(SMALL + 3), width, group, gears, tied)
+        known = weighed(Rows(columns, residual, 1.0), prior, 1.0)
+        assert np.ptp(known.open[2:]) == 0.0 and low <= known.open[2] <= high
+        sure.append(np.sqrt(known.covariance[1, 1]))
+        off.append(known.mean[1] / sure[-1])
+    assert np.sqrt(np.mean(np.square(off))) < 1.5
+    # Of an even gear's slope as much is known as without a curve: 300 rows, 5 / sqrt(12) each.
+    assert height or max(sure) < 1.1 / (np.sqrt(300.0 / 12.0) * 5.0)

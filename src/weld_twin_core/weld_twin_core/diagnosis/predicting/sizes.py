@@ -47,6 +47,8 @@ OPEN = 0.05
 judgement, for noise leaves nothing to be told by a twentieth."""
 USUAL = 0.3
 """Size from which on an error is one that machines usually have."""
+ROUNDING = 1e-12
+"""Share of the largest variance below which a direction is certain."""
 SWEEPS, LEARNING = 100, 20
 """Models drawn, and those until the chain has forgotten its start: on six sealed cells means of three
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
@@ -68,6 +70,8 @@ class Prior:
     gears: NDArray[np.bool_]
     """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
     geometry."""
+    tied: NDArray[np.bool_]
+    """Families whose coordinates all have one size, shape (G,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +200,14 @@ class _Chain:
         self.right = rows.share * width * rows.pull
         self.middle = prior.middle / prior.width
         self.hidden = hidden(rows, prior.group < 0)
+        curves = [np.flatnonzero(prior.group == k) for k in np.flatnonzero(prior.tied)]
+        self.tied = [each for each in curves if not self.hidden[each].all()]
+        for each in self.tied:
+            self.hidden[each] = False
         self.small = (prior.group >= 0) & ~self.hidden
+        self.single = self.small & ~prior.tied[prior.group]
+        self.counted = self.single.copy()
+        self.counted[[each[0] for each in self.tied]] = True
         # What was found is as large as it was found, for the chain may come upon it late.
         off = np.log(np.maximum(np.abs(self.middle), 1e-300))[:, None] - np.log(SIZES)
         start = np.where(self.middle == 0.0, SIZES[2], SIZES[np.abs(off).argmin(axis=1)])
@@ -241,7 +252,7 @@ class _Chain:
         seen.square += self._covariance(lower) + np.outer(mean, mean)
         seen.precision += size**-2.0
         seen.variance += size**2
-        usual, gear = size[self.small] >= USUAL, self.prior.gears[self.prior.group[self.small]]
+        usual, gear = size[self.counted] >= USUAL, self.prior.gears[self.prior.group[self.counted]]
         seen.usual += [usual[part].mean() if part.any() else 0.0 for part in (gear, ~gear)]
         seen.noise += self.noise
         seen.count += 1
@@ -265,7 +276,9 @@ class _Chain:
         lower, half = self._solved()
         (mean,) = self._coordinates(lower, half[:, None])
         covariance = np.asfortranarray(self._covariance(lower))
-        each = self.rng.permutation(np.flatnonzero(self.small))
+        for group in self.tied:
+            self._shared_size(group, mean, covariance)
+        each = self.rng.permutation(np.flatnonzero(self.single))
         luck = np.log(self.belief)[self.prior.group[each]]
         luck += self.rng.gumbel(size=luck.shape)
         squares = SIZES**2
@@ -282,12 +295,34 @@ class _Chain:
                 mean -= factor * (mean[j] - middle) * column
                 dger(-factor, column, column, a=covariance, overwrite_a=1)
 
+    def _shared_size(self, group: NDArray[np.int_], mean: Array, covariance: Array) -> None:
+        """
+        Draw the one size of some coordinates, as `_sizes` does for one, and keep mean and covariance so.
+
+        group: the coordinates.
+        """
+        old, off = self.size[group[0]] ** -2.0, mean[group] - self.middle[group]
+        own, columns = covariance[np.ix_(group, group)], covariance[:, group]
+        variance, turn = np.linalg.eigh(own)
+        variance = np.maximum(variance, ROUNDING * variance[-1])
+        squares, seen = SIZES[:, None] ** 2, np.maximum(1.0 / variance - old, 0.0)
+        pull, grown = (turn.T @ off) / variance, 1.0 + squares * seen
+        likely = 0.5 * (pull**2 * squares / grown - np.log(grown)).sum(axis=1)
+        likely += np.log(self.belief[self.prior.group[group[0]]])
+        self.size[group] = SIZES[(likely + self.rng.gumbel(size=likely.size)).argmax()]
+        more = self.size[group[0]] ** -2.0 - old
+        if more != 0.0:
+            factor = more / (1.0 + more * variance)
+            columns = columns @ turn
+            mean -= columns @ (factor * (turn.T @ off))
+            covariance -= (columns * factor) @ columns.T
+
     def _usual(self) -> None:
         """Draw how often each size comes in every family."""
         group, gears = self.prior.group, self.prior.gears
         counts = np.zeros(self.belief.shape)
-        chosen = np.searchsorted(SIZES, self.size[self.small])
-        np.add.at(counts, (group[self.small], chosen), 1.0)
+        chosen = np.searchsorted(SIZES, self.size[self.counted])
+        np.add.at(counts, (group[self.counted], chosen), 1.0)
         alike = counts[group[self.hidden]] + OWN * BELIEF
         self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
         for part in (gears, ~gears):

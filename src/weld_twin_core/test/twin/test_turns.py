@@ -108,7 +108,7 @@ def test_white_noise_hides_less_of_an_arm_than_chance_might():
         )
         hides.append(allowed(*fitted(robot, t, q, q, zero, rng)).discrepancy.position)
         uneven = q.copy()
-        uneven[:, 1] += 3e-5 * np.sin(40.0 * q[:, 1])  # finer than any wave or curve
+        uneven[:, 1] += 3e-5 * np.sin(150.0 * q[:, 1])  # finer than any wave or curve
         rest = allowed(*fitted(robot, t, q, uneven, zero, rng)).discrepancy
         shows.append(np.hypot(rest.position, 0.5 * rest.gears[1]))
     # Of 2,000 samples with 20 um, 128 at a time, one standard error of a variance is (0.8 um)^2.

@@ -219,6 +219,8 @@ def _of_many(
     verdict = row['verdict']
     for said in row['statements']:
         kind, level = said['kind'], said['kind'].split()[0]
+        if kind == 'nameless':  # all that is at work there has a name
+            yield kind, said['features'], False, said['probability'], False
         if kind != 'name' and not kind.endswith('many'):
             continue
         right, sure = whole_right, bool(verdict['sure'])

@@ -219,12 +219,12 @@ def _of_many(
     verdict = row['verdict']
     for said in row['statements']:
         kind, level = said['kind'], said['kind'].split()[0]
-        if kind == 'nameless':  # all that is at work there has a name
-            yield kind, said['features'], False, said['probability'], False
-        if kind != 'name' and not kind.endswith('many'):
-            continue
         right, sure = whole_right, bool(verdict['sure'])
-        if said['cause'] is not None:
+        if kind == 'nameless':  # all that is at work there has a name
+            right = sure = False
+        elif kind != 'name' and not kind.endswith('many'):
+            continue
+        elif said['cause'] is not None:
             cause, part = verdict['causes'][said['cause']], row['there'][said['cause']]
             if part is None or not cause[level]:
                 continue

@@ -244,7 +244,7 @@ def _prior(what: Directions, model: Model) -> Prior:
         plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
         np.concatenate([gears, np.ones(springs + len(sizes), bool)]),
-        np.arange(gears.size + springs + len(sizes)) >= gears.size + springs,
+        np.concatenate([np.zeros(gears.size + springs, bool), np.ones(len(sizes), bool)]),
     )
 
 

@@ -141,6 +141,20 @@ def test_temperatures_times_and_spreads_have_units_too(tmp_path):
     np.testing.assert_allclose(recording.measured.sigma, 3e-5)
 
 
+@pytest.mark.parametrize(
+    ('step', 'far', 'rests'), [(0.02, 1e-3, False), (6.0, 1e-3, True), (0.02, 1.0, True)]
+)
+def test_rows_of_a_motion_are_no_stations(tmp_path, step, far, rests):
+    """Fifty rows a second follow a motion, unless no drive could go so far from row to row."""
+    q = Q[0] + far * (Q - Q[0])
+    seen = forward(ARM, q)[:, :3, 3] + RNG.normal(scale=1e-5, size=(12, 3))
+    body = rows(step * np.arange(12.0)[:, None], np.degrees(q), 1e3 * seen)
+    recording, said = of(tmp_path, lines(f'time [s],{PLAIN}', body))
+    assert recording.joints.static is rests
+    assert ('one motion' in ' '.join(said)) is not rests
+    np.testing.assert_allclose(recording.measured.t, recording.joints.t)
+
+
 @pytest.mark.parametrize('stamp', ['2041-03-01T08:00:{:02d}', '22400000{:02d}'])
 def test_stamps_that_no_bag_holds_are_told_and_counted_from_the_first(tmp_path, stamp):
     body = [f'{stamp.format(k)},{row}' for k, row in enumerate(rows(DEG, MM))]

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A table to a recording of static stations, with every assumption put into words."""
+"""A table to a recording of stations or of a motion, with every assumption put into words."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Recording, Signal
 
+from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
 from .header import Columns, find_columns
 from .joint_readings import Units, joint_angles, joint_units
@@ -51,7 +52,7 @@ _WRONG = 0.05
 
 
 class Table(NamedTuple):
-    """A recording of static stations, and the sentences that say how the table was read."""
+    """A recording of stations or of a motion, and the sentences that say how it was read."""
 
     recording: Recording
     assumptions: tuple[str, ...]
@@ -129,10 +130,15 @@ class _Reading:
         sigma = self._sigma(scale) if columns.sigma else None
         self._check(q, position)
         epoch, t = self._clock()
+        motion, measured = JointMotion(t, q), Measurements(t, position, rotation, sigma)
+        if looks_static(robot, motion, measured):
+            motion = JointMotion(t, q, static=True)
+        else:
+            said.append('by their stamps the rows are one motion, not stations at rest')
         recording = Recording(
             cells.path.stem,
-            JointMotion(t, q, static=True),
-            Measurements(t, position, rotation, sigma),
+            motion,
+            measured,
             temperature=self._temperature(t),
             effort=self._effort(t),
             epoch_ns=epoch,

@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.programs import (
     Context,
@@ -21,6 +22,7 @@ from weld_twin_msgs_py.programs import (
     controller_of,
     read_sources,
     rewritten,
+    to_moves,
 )
 from weld_twin_msgs_py.programs.source import (
     ABB_POSE,
@@ -142,13 +144,135 @@ def test_an_abb_move_is_as_fast_as_its_line_says(speed, told):
 
 @pytest.mark.parametrize(
     'line',
-    ['LIN_REL {X 5}', 'LIN {X 5,Y 1}', 'LIN XP1:XP2', 'SPL XP1', 'PTP HOME', 'CIRC XP1,XP2,CA 90'],
+    [
+        'LIN_REL {X 5}',
+        'LIN {X 5,Y 1}',
+        'LIN XP1:XP2',
+        'SPL XP1',
+        'PTP HOME',
+        'CIRC XP1,XP2,CA 90',
+        'LIN XP1 : XP2',
+        'LIN XP1 : {Z 5}',
+    ],
 )
 def test_kuka_moves_that_are_not_understood_say_so(line):
     point = 'DECL E6POS {}={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n'
     text = 'DEF a()\n' + point.format('XP1') + point.format('XP2') + f'{line}\nEND\n'
     (step,) = read('krl', (text,), 'kuka_kr16_2').steps
     assert step.end is None and step.why
+
+
+BEFORE = {
+    'krl': 'LIN XP2 ;',
+    'rapid': '        ArcLStart pStart',
+    'urscript': '    movel(Waypoint_1_p',
+    'inform': 'MOVL C00001',
+    'fanuc-ls': '   5:L P[2]',
+}
+"""Where the bracket's seam begins, in each language."""
+FRAME = '{X 10,Y 0,Z 0,A 0,B 0,C 0}'
+IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
+
+
+@pytest.mark.parametrize(
+    ('language', 'lines', 'reason'),
+    [
+        ('krl', '$TOOL.Z = 300\n', 'set in parts'),
+        ('krl', '$BASE.X = 10\n', 'set in parts'),
+        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[2].X = 5\n', 'set anew'),
+        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[i] = F\n', 'set anew'),
+        ('krl', f'FRAME F={FRAME}\n$BASE = F\nF.X = F.X + 10\n', 'set anew'),
+        ('krl', '$IPO_MODE = #TCP\n', 'the tool stands still'),
+        (
+            'krl',
+            'DECL FDAT FX={TOOL_NO 0,BASE_NO 0,IPO_FRAME #TCP}\nFDAT_ACT=FX\n',
+            'stands still',
+        ),
+        ('rapid', 'tTorch.tframe.trans.z := 300;\n', 'set anew'),
+        ('rapid', 'wobjTable.oframe := DefFrame(p10, p20, p30);\n', 'set anew'),
+        ('rapid', 'wobjTable := wobjOther;\n', 'set anew'),
+        ('urscript', f'F = p[0,0,0.1,0,0,0]\nF[2] = 0.3\n{IN_FRAME}', 'worked out'),
+        ('urscript', f'F = p[0,0,0.1,0,0,0]\nF = pose_add(F, F)\n{IN_FRAME}', 'worked out'),
+        ('urscript', 'T = p[0,0,0.1,0,0,0]\nT[2] = 0.3\nset_tcp(T)\n', 'the numbers of tool T'),
+        (
+            'urscript',
+            'movej(get_inverse_kin(Waypoint_1_p, Start_q, tcp=p[0,0,1,0,0,0]))\n',
+            'worked out',
+        ),
+        ('fanuc-ls', '   5:  UTOOL[1]=PR[3] ;\n', 'UTOOL 1 are set'),
+        ('fanuc-ls', '   5:  UTOOL[R[2]]=PR[3] ;\n', 'UTOOL 1 are set'),
+        ('fanuc-ls', '   5:  Touch Offset PR[1] ;\n', 'Touch Offset'),
+        ('inform', 'SETTOOL TL#(1) P001\n', 'TL 1 are set'),
+    ],
+)
+def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, reason):
+    robot, files = PROGRAMS[language]
+    source, *beside = [(MADE / name).read_bytes().decode('latin-1') for name in files]
+    start = BEFORE[language]
+    text = source.replace(start, lines + start, 1)
+    assert text != source
+    program = read(language, (text, *beside), robot)
+    own = context(robot, language).controller
+    moves = [move for piece in to_moves(program, wt.load(robot), own).pieces for move in piece]
+    assert any(move.kind == 'unknown' and reason in move.why for move in moves)
+
+
+def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
+    source = (MADE / 'bracket.mod').read_text().replace('[TRUE, [[0,0,250]', '[FALSE, [[0,0,250]')
+    robot = wt.load('abb_irb1600')
+    torch = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, 0.2]))
+    own = controller_of(robot.with_frames(tool=torch), 'rapid')
+    program = read('rapid', (source,), 'abb_irb1600')
+    moves = [move for piece in to_moves(program, robot, own).pieces for move in piece]
+    assert {move.kind for move in moves} == {'unknown'}
+
+
+@pytest.mark.parametrize(
+    ('language', 'line'),
+    [
+        ('rapid', 'TriggLDPO p10, v100, fine, tTorch;\n'),
+        ('rapid', 'MovePnP pElsewhere, v100, fine, tElsewhere;\n'),
+        ('rapid', 'SearchL di1, pHere, p10, v10, tTorch;\n'),
+        ('rapid', 'EGMRunJoint egm1, EGM_STOP_HOLD;\n'),
+        ('urscript', 'path_offset_set(p[0,0,0.1,0,0,0], 1)\n'),
+        ('inform', 'SMOVL C00001 V=100.0\n'),
+        ('inform', 'SYMOVL C00001 V=100.0 CV#(1)\n'),
+        ('inform', 'MOVL C00001 V=100.0\n  +MOVJ C00002 VJ=10.0\n'),
+        ('fanuc-ls', '   5:L P[3] 8mm/sec FINE RTCP    ;\n'),
+    ],
+)
+def test_moves_of_another_kind_end_what_is_known(language, line):
+    robot, files = PROGRAMS[language]
+    source, *beside = [(MADE / name).read_bytes().decode('latin-1') for name in files]
+    start = BEFORE[language]
+    text = source.replace(start, line + start, 1)
+    assert text != source
+    before, after = (read(language, (each, *beside), robot).steps for each in (source, text))
+    assert [step.end for step in after].count(None) == [step.end for step in before].count(
+        None
+    ) + 1
+
+
+def test_instructions_that_move_nothing_end_nothing():
+    source = (MADE / 'bracket.mod').read_text()
+    calls = 'TPWrite "at " \\Pos:=p10.trans;\npNow := CRobT(\\Tool:=tTorch);\nVelSet 50, 800;\nRETURN;\n'
+    start = BEFORE['rapid']
+    text = source.replace(start, calls + start, 1)
+    assert all(step.end is not None for step in read('rapid', (text,), 'abb_irb1600').steps)
+
+
+def test_several_trajectories_in_a_file_are_refused():
+    source = (MADE / 'bracket.yaml').read_text()
+    with pytest.raises(TwinError, match='several trajectories'):
+        read('joint-trajectory', (f'{source}\n---\n{source}',), 'ur5')
+
+
+@pytest.mark.parametrize('before', ['\xef\xbb\xbf', '# \xc3\x85land, \x85\n', '\xef\xbb\xbf# a\n'])
+def test_marks_and_letters_of_other_alphabets_part_no_lines(before):
+    source = (MADE / 'bracket.csv').read_text()
+    assert len(read('csv', (before + source,), 'ur5').steps) == len(
+        read('csv', (source,), 'ur5').steps
+    )
 
 
 @pytest.mark.parametrize(

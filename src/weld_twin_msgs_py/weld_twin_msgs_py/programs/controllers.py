@@ -143,6 +143,9 @@ class Frame(NamedTuple):
     """Shape (4, 4) [m]; None where the program has no numbers."""
     moving: bool | None = False
     """A base that goes along with a positioner; None where the program does not say."""
+    why: str = ''
+    """Why the program does not say where it is at a move; then only numbers that were given
+    count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +187,14 @@ class Controller:
             value = frame.value if given is None else given
             assert value is not None
             return np.asarray(self.flange @ value)
+        if frame.why:
+            raise DataError(frame.why + _ask(frame, '--tool'))
         if not frame.name:
             return self.own_tool
         if np.abs(self.own_tool[:3, 3] - self.flange[:3, 3]).max() < 1e-9:
             raise DataError(
                 f'the numbers of tool {frame.name} are not in the program, and the robot file has '
-                f"no tool; give them with --tool '{frame.name}=X,Y,Z,...'"
+                'no tool' + _ask(frame, '--tool')
             )
         self._note(
             f'the numbers of tool {frame.name} are not in the program; the tool of the robot file '
@@ -236,16 +241,20 @@ class Controller:
             return np.asarray(origin @ given)
         if frame.value is not None:
             return np.asarray(origin @ frame.value)
-        if not frame.name:
+        if not frame.name and not frame.why:
             return origin
         raise DataError(
-            f'the numbers of base {frame.name} are not in the program; give them with '
-            f"--base '{frame.name}=X,Y,Z,...'"
+            (frame.why or f'the numbers of base {frame.name} are not in the program')
+            + _ask(frame, '--base')
         )
 
     def _note(self, text: str) -> None:
         if text not in self.notes:
             self.notes.append(text)
+
+
+def _ask(frame: Frame, option: str) -> str:
+    return f"; give them with {option} '{frame.name}=X,Y,Z,...'" if frame.name else ''
 
 
 def controller_of(

@@ -11,6 +11,7 @@ Optional: ``move`` (joint, linear), ``speed`` (m/s, of joint moves the share of 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,10 +44,11 @@ class CsvReader(Reader):
 
     def read(self) -> Program:
         head: list[str] = []
-        for place, line in self.source.lines():
-            if not line.strip() or line.lstrip().startswith('#'):
+        for line in re.finditer(r'[^\r\n]+', self.text):
+            place = line.start()
+            if not line[0].strip() or line[0].lstrip().startswith('#'):
                 continue
-            parts, where = self.pieces(place, place + len(line)), self.source.where(place)
+            parts, where = self.pieces(*line.span()), self.source.where(place)
             if not head:
                 head = [unguarded(self.source.text[slice(*part)].strip('"')) for part in parts]
                 columns, notation = self._columns(where, head)

@@ -37,7 +37,12 @@ _MOVE = re.compile(r'^([JLCAS])[ \t]+(P|PR)\[\s*([^\]]*)\](.*)', re.S)
 _NEXT = re.compile(r'^\s*:?\s*(P|PR)\[\s*([^\]]*)\](.*)', re.S)
 _INDEX = re.compile(r'(\d+)\s*(?::.*)?\Z', re.S)
 _KINDS: dict[str, Kind] = {'J': 'joint', 'L': 'linear', 'C': 'circular'}
-_SHIFTING = re.compile(r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_', re.I)
+_SHIFTING = re.compile(
+    r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_|\bRTCP\b|\bTA_REF\b', re.I
+)
+"""What lets a move go elsewhere; RTCP is a tool that stands still."""
+_DISPLACING = re.compile(r'Touch Offset (End\b)?', re.I)
+_FRAME_SET = re.compile(r':[ \t]*(UFRAME|UTOOL)\[\s*(\d*)[^=\r\n]*=')
 _SPEED = re.compile(r'([\d.]+)[ \t]*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)')
 _UNITS = {'mm/sec': 1e-3, 'cm/min': 0.01 / 60.0, 'inch/min': 0.0254 / 60.0}
 SPEED = 0.1
@@ -54,10 +59,12 @@ class FanucReader(Reader):
         self.points: dict[int, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.untaught: dict[int, str] = {}
+        self.displaced = ''
 
     def read(self) -> Program:
         parts = {result[1]: result.start() for result in _PART.finditer(self.text)}
         moves, points = parts.get('MN', 0), parts.get('POS', len(self.text))
+        self.numbered_set(_FRAME_SET)
         for result in _POINT.finditer(self.text, points):
             self._point(result)
         for result in _STATEMENT.finditer(self.text, moves, points):
@@ -143,8 +150,8 @@ class FanucReader(Reader):
         if result is None:
             raise DataError(f'{where}: a point needs UF and UT')
         user, tool = result[1], result[2]
-        base = Frame('', np.eye(4)) if user == '0' else Frame(user)
-        return Frame(tool), base
+        base = Frame('', np.eye(4)) if user == '0' else self.numbered('UFRAME', user)
+        return self.numbered('UTOOL', tool), base
 
     # Moves -----------------------------------------------------------------------------------
 
@@ -153,6 +160,9 @@ class FanucReader(Reader):
         wait = re.match(rf'WAIT\s+({NUMBER})\s*\(sec\)', text)
         if wait is not None:
             self.program.dwell(max(float(wait[1]), 0.0))
+        offset = _DISPLACING.match(text)
+        if offset is not None:
+            self.displaced = '' if offset[1] else f'Touch Offset at {where}'
         move = _MOVE.match(text)
         self._hold_used(text, where, move is not None)
         if move is None:
@@ -166,9 +176,10 @@ class FanucReader(Reader):
                 raise DataError(f'{where}: a circular move needs two points')
             name, index, tail = end[1], end[2], end[3]
         point = self._index(name, index)
-        shift = _SHIFTING.search(tail)
+        found = _SHIFTING.search(tail)
+        shift = self.displaced if found is None else found[0]
         lost = point is None or (kind == 'circular' and via is None) or move[1] not in _KINDS
-        if lost or shift is not None:
+        if lost or shift:
             self.program.unknown(kind, where, self._why(name, index, shift))
             return
         self._add(kind, where, via, point, tail)
@@ -203,10 +214,10 @@ class FanucReader(Reader):
         result = _INDEX.match(text)
         return self.points.get(int(result[1])) if name == 'P' and result is not None else None
 
-    def _why(self, name: str, index: str, shift: re.Match[str] | None) -> str:
+    def _why(self, name: str, index: str, shift: str) -> str:
         result = _INDEX.match(index)
-        if shift is not None:
-            return f'{shift[0]} shifts it'
+        if shift:
+            return f'{shift} shifts it'
         if name == 'P' and result is not None and int(result[1]) in self.untaught:
             return self.untaught[int(result[1])]
         return f'{name}[{index}] is not given here'

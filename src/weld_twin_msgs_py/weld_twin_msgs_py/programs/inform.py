@@ -33,8 +33,10 @@ from .source import YASKAWA_POSE, Notation, Number, Source, joint_notation
 
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
-_MOVE = re.compile(r'^[ \t]*(MOV[JLCS]|IMOV|EIMOV[LC])\b[ \t]*([^\r\n]*)', re.M)
+_MOVE = re.compile(r'^[ \t]*(\+?[A-Z]*MOV[A-Z]*)\b[ \t]*([^\r\n]*)', re.M)
+"""Also moves that go along with another robot, a positioner or a conveyor: SMOVL, EMOVL, SYMOVL."""
 _SHIFT = re.compile(r'^[ \t]*(SFTON|SFTOF|MULMAT|GETPOS|SETUALM)\b', re.M)
+_FRAME_SET = re.compile(r'^[ \t]*(?:MFRAME|SETTOOL)[ \t]+(UF|TL)#\((\d*)', re.M)
 _TIMER = re.compile(r'^[ \t]*TIMER[ \t]+T=([^\s]+)', re.M)
 _KINDS: dict[str, Kind] = {'MOVJ': 'joint', 'MOVL': 'linear', 'MOVC': 'circular'}
 SPEED, JOINT_SPEED = 0.1, 0.1
@@ -58,6 +60,7 @@ class InformReader(Reader):
         self.arc: list[Step] = []
 
     def read(self) -> Program:
+        self.numbered_set(_FRAME_SET)
         result = re.search(r'^//INST\b', self.text, re.M)
         cut = len(self.text) if result is None else result.start()
         self.in_order({_HEAD: self._head, _POINT: self._point}, 0, cut)
@@ -68,12 +71,13 @@ class InformReader(Reader):
     def _head(self, result: re.Match[str]) -> None:
         word, value = result[1].upper(), (result[2] or '').strip()
         if word == 'TOOL':
-            self.tool = Frame(value)
+            self.tool = self.numbered('TL', value)
         elif word == 'USER':
             self.user = value
         elif word == 'POSTYPE':
             self.form = value.upper()
-        self.base = Frame(self.user or 'USER') if self.form == 'USER' else Frame('', np.eye(4))
+        named = self.numbered('UF', self.user or 'USER')
+        self.base = named if self.form == 'USER' else Frame('', np.eye(4))
 
     def _point(self, result: re.Match[str]) -> None:
         if result[1] != 'C':

@@ -61,6 +61,10 @@ class TrajectoryReader(Reader):
         result = _NAMES.search(self.text)
         if result is None:
             raise DataError(f'{self.source.where(0)}: a trajectory needs joint_names')
+        if len(_NAMES.findall(self.text)) > 1:
+            raise DataError(
+                f'{self.source.name}: it holds several trajectories; give each a file of its own'
+            )
         names = [self.text[a:b].strip(' "\'') for a, b in self._items(result.end())]
         if sorted(names) != sorted(joints):
             raise DataError(

@@ -46,9 +46,20 @@ _DECLARED = re.compile(
     re.I | re.M,
 )
 _SET = re.compile(
-    r'^[ \t]*(\$BASE|\$TOOL|\$VEL\.CP|\$VEL_AXIS\[\w+\]|FDAT_ACT|LDAT_ACT|PDAT_ACT|'
-    r'(?:BASE|TOOL)_DATA\[\d+\])[ \t]*=[ \t]*([^\r\n]*)',
+    r'^[ \t]*(\$(?:BASE|TOOL)(?:\.\w+)?|\$IPO_MODE|\$VEL\.CP|\$VEL_AXIS\[\w+\]|FDAT_ACT|LDAT_ACT|'
+    r'PDAT_ACT|(?:BASE|TOOL)_DATA\[\d+\])[ \t]*=[ \t]*([^\r\n]*)',
     re.I | re.M,
+)
+_ASSIGNED = re.compile(
+    r'^[ \t]*(?:(?:GLOBAL|DECL|CONST|FRAME|FDAT)[ \t]+)*([A-Z_]\w*(?:\[\s*\d+\s*\])?)'
+    r'((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)',
+    re.I | re.M,
+)
+"""What may be a frame, or hold the number of one; and what part of it."""
+_AFTER = re.compile(r'(?:[ \t]*C_\w+)*[ \t]*\Z', re.I)
+"""What may stand behind a target."""
+STILL = Frame(
+    '', why='the tool stands still there and the robot carries the workpiece ($IPO_MODE is #TCP)'
 )
 _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
@@ -78,6 +89,8 @@ class _State:
     base: Frame = field(default_factory=lambda: Frame(''))
     speed: float = SPEED
     joint_speed: float = 0.1
+    still: bool = False
+    """The tool stands still."""
 
 
 class KrlReader(Reader):
@@ -96,6 +109,7 @@ class KrlReader(Reader):
         self.kinematic = ''
 
     def read(self) -> Program:
+        self.again = {name.lower(): where for name, where in self.set_again(_ASSIGNED).items()}
         for file in range(len(self.sources)):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)
@@ -197,7 +211,7 @@ class KrlReader(Reader):
         what = result[1].upper()
         start, end = stripped(self.text, *result.span(2))
         value = self.text[start:end]
-        if what in ('$BASE', '$TOOL'):
+        if what[:5] in ('$BASE', '$TOOL'):
             along = _ALONG.match(value) if what == '$BASE' else None
             if along is not None:
                 self._second_kinematic(along[1])
@@ -207,14 +221,24 @@ class KrlReader(Reader):
             frame = self._frame_at(0, start, end)
             unclear = along is None and re.match(r'EK\b', value, re.I)
             named = Frame(_bare(value) or value, frame, None if unclear else along is not None)
-            self.state.base = named if what == '$BASE' else self.state.base
-            self.state.tool = named if what == '$TOOL' else self.state.tool
+            if '.' in what:
+                named = Frame(
+                    what[:5],
+                    why=f'the numbers of {what[:5]} are set in parts at {self.where(result)}',
+                )
+            elif where := self._again(value):
+                named = Frame(named.name, why=f'the numbers of {value} are set anew at {where}')
+            self.state.base = named if what[:5] == '$BASE' else self.state.base
+            self.state.tool = named if what[:5] == '$TOOL' else self.state.tool
+        elif what == '$IPO_MODE':
+            self.state.still = value.upper() != '#BASE'
         elif what == '$VEL.CP':
             self.state.speed = self._speed(start, end, self.state.speed)
         elif what.startswith('$VEL_AXIS'):
             self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
         elif what == 'FDAT_ACT':
             self.state.tool, self.state.base = self._frames_of(value)
+            self.state.still = False
         elif what == 'LDAT_ACT' and value.lower() in self.data:
             speed = self.data[value.lower()].numbers.get('VEL')
             self.state.speed = self.state.speed if speed is None else max(speed.value, LEAST_SPEED)
@@ -236,20 +260,28 @@ class KrlReader(Reader):
     def _frames_of(self, name: str) -> tuple[Frame, Frame]:
         """Return tool and base of the data of a taught point."""
         content = self.data.get(name.lower())
-        if content is None:
+        if content is None or self._again(name):
             return Frame(name), Frame(name)
         numbers = [content.numbers.get(key) for key in ('TOOL_NO', 'BASE_NO')]
         tool, base = (
             Frame(name) if number is None else self._numbered(what, f'{number.value:g}')
             for what, number in zip(('TOOL', 'BASE'), numbers, strict=True)
         )
-        return tool, base
+        fixed = content.others.get('IPO_FRAME', '#BASE').upper() != '#BASE'
+        return STILL if fixed else tool, base
+
+    def _again(self, name: str) -> str:
+        """Return where a frame is set anew, of all of a table where its index is worked out; or ''."""
+        name = re.sub(r'\s', '', name.lower())
+        return self.again.get(name, self.again.get(name.partition('[')[0], ''))
 
     def _numbered(self, what: str, text: str) -> Frame:
         """Return a frame by its number; number 0 is the robot's own."""
         if text.strip() == '0':
             return Frame('', np.eye(4))
         key = f'{what}_DATA[{text.strip()}]'
+        if where := self._again(key):
+            return Frame(text.strip(), why=f'the numbers of {key} are set anew at {where}')
         # Numbered bases of an external kinematic system are taken as such by the controller alone.
         return Frame(text.strip(), self.frames.get(key), None if what == 'BASE' else False)
 
@@ -300,6 +332,14 @@ class KrlReader(Reader):
         if len(parts) > wanted:
             self.unknown(kind, result, f'{word} with {len(parts)} arguments is not understood')
             return
+        pieces = self.pieces(result.end(), cut)
+        if any(
+            not _AFTER.match(text, a, b) for (_, a), (_, b) in zip(parts, pieces, strict=False)
+        ):
+            self.unknown(
+                kind, result, f'what stands behind the target of {word} is not understood'
+            )
+            return
         frames = self._own_frames(text[cut:end].upper())
         if frames is None:
             self.unknown(kind, result, f'{word} has a tool or base that is worked out')
@@ -319,7 +359,7 @@ class KrlReader(Reader):
 
     def _own_frames(self, settings: str) -> tuple[Frame, Frame] | None:
         """Return tool and base of a move, its own settings counted; None where they are open."""
-        frames = [self.state.tool, self.state.base]
+        frames = [STILL if self.state.still else self.state.tool, self.state.base]
         for k, what in enumerate(('TOOL', 'BASE')):
             if f'${what}' not in settings:
                 continue

@@ -50,10 +50,20 @@ _MOVE = re.compile(
     re.I,
 )
 _OTHER = re.compile(
-    r'\b(Search[LC]|MoveExtJ|CapL|CapC|SpotL|SpotJ|DispL|DispC|PaintL|EGMMoveL|EGMRunPose|'
-    r'PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|IndAMove)\b',
+    r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|EGMRun\w+|Ind[ARCD]Move|StepBwdPath|'
+    r'PathRecMove\w+|MoveExtJ)\b',
     re.I,
 )
+"""What shifts the points after it, or moves the arm and names neither tool nor point."""
+_CALL = re.compile(
+    r'(?:^|(?<=;))[ \t]*(?!RETURN\b|CONNECT\b)([A-Za-z]\w*)(?=[ \t\\])(?!\s*:=)'
+    r'((?:[^;\r\n]|,[ \t]*\r?\n|\r?\n(?=[ \t]*\\))*);',
+    re.I | re.M,
+)
+"""A statement that calls an instruction, and its arguments."""
+_OWN_DATA = re.compile(r'v(?:\d+|max)|z\d+|fine')
+"""Speeds and zones that every controller has."""
+_ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.\w+)*)\s*:=', re.I)
 _DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)\b', re.I | re.M)
@@ -89,6 +99,7 @@ class RapidReader(Reader):
         self.unit = ''
 
     def read(self) -> Program:
+        self.again = {name.lower(): where for name, where in self.set_again(_ASSIGNED).items()}
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
         self.in_order(
@@ -97,6 +108,7 @@ class RapidReader(Reader):
                 _OTHER: self._other,
                 _WAIT: lambda match: self.dwell(match.span(2)),
                 _CONF: self._conf,
+                _CALL: self._call,
                 _ROUTINE: self.new_piece,
             }
         )
@@ -119,10 +131,14 @@ class RapidReader(Reader):
             point = self._target(tree, result.end(), result[2], kind == 'jointtarget')
             if point is not None:
                 self.names[name] = point
-        elif kind == 'tooldata':
-            self.tools[name] = self._tool(tree, result[2], result.end())
-        elif kind == 'wobjdata':
-            self.bases[name] = self._wobj(tree, result[2], result.end())
+        elif kind in ('tooldata', 'wobjdata'):
+            frames, read = (
+                (self.tools, self._tool) if kind == 'tooldata' else (self.bases, self._wobj)
+            )
+            frames[name] = read(tree, result[2], result.end())
+            if name in self.again:
+                why = f'the numbers of {result[2]} are set anew at {self.again[name]}'
+                frames[name] = Frame(result[2], why=why)
         elif isinstance(tree, list) and tree and isinstance(tree[0], Leaf):
             speed = self.number(*tree[0], f'the speed of {result[2]}').value
             self.speeds[name] = max(speed, 0.1) * 1e-3
@@ -130,25 +146,25 @@ class RapidReader(Reader):
     def _tool(self, tree: Tree, name: str, at: int) -> Frame:
         parts = tree if isinstance(tree, list) else []
         if len(parts) < 2 or not self._is(parts[0], 'TRUE'):
-            return Frame(f'{name}, which does not sit on the robot,')
+            return Frame('', why=f'{name} stands still, and the robot carries the workpiece')
         return Frame('', self._pose(parts[1], name, at))
 
     def _wobj(self, tree: Tree, name: str, at: int) -> Frame:
         parts = tree if isinstance(tree, list) else []
         if len(parts) < 5 or not self._is(parts[0], 'FALSE'):
-            return Frame(f'{name}, which moves,')
+            return Frame('', why=f'{name} moves')
         if isinstance(parts[1], Leaf) and self._is(parts[1], 'FALSE'):
             unit = re.match(r'\s*,\s*"([^"]+)"', self.source.text[parts[1].end :])
             if unit is not None:  # strings are blanked out in what the parts are of
                 return self._on_unit(name, unit[1], self._pose(parts[4], name, at))
         if not self._is(parts[1], 'TRUE'):
-            return Frame(f'{name}, which moves,')
+            return Frame('', why=f'{name} moves')
         return Frame('', self._pose(parts[3], name, at) @ self._pose(parts[4], name, at))
 
     def _on_unit(self, name: str, unit: str, frame: Array) -> Frame:
         """Return a work object that a mechanical unit moves: the unit has its user frame itself."""
         if not self.context.controller.external:
-            return Frame(f'{name}, which moves,')
+            return Frame('', why=f'{name} moves')
         self.unit = self.unit or unit
         if unit != self.unit:
             raise DataError(
@@ -231,6 +247,19 @@ class RapidReader(Reader):
             self.displaced = f'{result[1]} at {where} displaces it'
         else:
             self.unknown('linear', result, f'{result[1]} is not understood')
+
+    def _call(self, result: re.Match[str]) -> None:
+        """Take an instruction that nobody knows for a move if it is handed what moves need."""
+        if any(
+            known.search(self.text, result.start(1), result.end()) for known in (_MOVE, _OTHER)
+        ):
+            return
+        for start, end in self.pieces(*result.span(2)):
+            name = self.text[start : self._before_switch(start, end)].lower()
+            needed = any(name in table for table in (self.names, self.tools, self.speeds))
+            if needed or _OWN_DATA.fullmatch(name):
+                self.unknown('linear', result, f'{result[1]} is not understood')
+                return
 
     # Moves -----------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from .build import Program
 from .context import Context
+from .controllers import Frame
 from .source import Number, Source, masked, number_at, split_outside, stripped
 
 Span = tuple[int, int]
@@ -35,6 +36,7 @@ class Reader(ABC):
         self.texts = [masked(source.text, self.comments) for source in sources]
         self.text = self.texts[0]
         self.program = Program('', self.sources)
+        self.again: dict[str, str] = {}
 
     @abstractmethod
     def read(self) -> Program:
@@ -56,6 +58,33 @@ class Reader(ABC):
         ]
         for _, handle, match in sorted(matches, key=lambda each: each[0]):
             handle(match)
+
+    def set_again(self, pattern: re.Pattern[str]) -> dict[str, str]:
+        """
+        Return, by name, where what is set more than once, or in parts, is set so.
+
+        What it is at a move hangs on what ran before, which nobody follows here.
+
+        pattern: its first group is the name, its second is empty where the whole is set.
+        """
+        out, whole = dict[str, str](), set[str]()
+        for source, text in zip(self.sources, self.texts, strict=True):
+            for match in pattern.finditer(text):
+                name = re.sub(r'\s', '', match[1])
+                if match[2] or name in whole:
+                    out.setdefault(name, source.where(match.start(1)))
+                whole.add(name)
+        return out
+
+    def numbered_set(self, pattern: re.Pattern[str]) -> None:
+        """Take in where a frame of a table (first group) and number (second), or of any, is set."""
+        for match in pattern.finditer(self.text):
+            self.again.setdefault(match[1] + match[2], self.where(match))
+
+    def numbered(self, table: str, index: str) -> Frame:
+        """Return a frame of a table; one that the program sets is not what the table holds."""
+        where = self.again.get(table + index, self.again.get(table, ''))
+        return Frame(index, why=where and f'the numbers of {table} {index} are set at {where}')
 
     def where(self, match: re.Match[str], group: int = 0) -> str:
         """Return file and line of what was found."""

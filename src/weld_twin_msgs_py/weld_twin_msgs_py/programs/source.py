@@ -18,7 +18,7 @@ and z, so KUKA, FANUC and Yaskawa differ in the order of the numbers alone.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -189,13 +189,6 @@ class Source:
         """Return file and line of a character, as messages have it."""
         return f'{self.name} line {self.line(place)}'
 
-    def lines(self, text: str | None = None) -> Iterator[tuple[int, str]]:
-        """Yield place and content of every line, of another text of the same length if given."""
-        place = 0
-        for line in (self.text if text is None else text).splitlines(keepends=True):
-            yield place, line.rstrip('\r\n')
-            place += len(line)
-
 
 class Number(NamedTuple):
     """A number in a text: its value, and where it stands."""
@@ -224,6 +217,11 @@ def read_source(path: Path | str) -> Source:
     if b'\0' in raw:
         raise DataError(
             f"program '{path}' is no text; export it from the controller as text (ASCII) first"
+        )
+    if b'\r' in raw and b'\n' not in raw:
+        raise DataError(
+            f"program '{path}' has line ends of another age (CR alone); save it with those of "
+            'Windows or Linux'
         )
     return Source(Path(path).name, raw.decode('latin-1'))
 
@@ -291,8 +289,12 @@ def stripped(text: str, start: int, end: int) -> tuple[int, int]:
 
 
 def masked(text: str, patterns: Sequence[str]) -> str:
-    """Return a text of the same length with comments and strings blanked out, line ends kept."""
-    either = re.compile('|'.join(f'(?:{pattern})' for pattern in patterns))
+    """
+    Return a text of the same length with comments and strings blanked out, line ends kept.
+
+    So is the mark (BOM) that Windows sets before UTF-8.
+    """
+    either = re.compile('|'.join(f'(?:{pattern})' for pattern in (r'\A\xef\xbb\xbf', *patterns)))
     return either.sub(lambda result: re.sub(r'[^\r\n]', ' ', result[0]), text)
 
 

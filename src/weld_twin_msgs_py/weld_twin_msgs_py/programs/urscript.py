@@ -40,13 +40,18 @@ DEFAULT_SPEED = {'joint': 1.05, 'linear': 0.25, 'circular': 0.25}
 """rad/s and m/s, as the manual gives them."""
 OTHER_MOTION = (
     'servoj|servol|servoc|speedj|speedl|force_mode|conveyor_pulse_decode|freedrive_mode|'
-    'teach_mode|optimovej|optimovel|path_offset_enable|set_reference_frame|move_process'
+    r'teach_mode|optimovej|optimovel|path_offset_\w+|set_reference_frame|move_process|'
+    r'track_conveyor_\w+|frame_tracking_\w+|screw_driving'
 )
 """Functions that move the arm, or its frames, in another way."""
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(?:def|thread)\s)'
 )
-_ASSIGNED = re.compile(r'^([ \t]*(?:global|local)?[ \t]*)([A-Za-z_]\w*)[ \t]*=(?!=)[ \t]*', re.M)
+_ASSIGNED = re.compile(
+    r'(?:^|(?<=;))[ \t]*(?:(?:global|local)[ \t]+)?([A-Za-z_]\w*)((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)'
+    r'[ \t]*',
+    re.M,
+)
 
 
 class UrscriptReader(Reader):
@@ -69,16 +74,17 @@ class UrscriptReader(Reader):
                 self.program.new_piece()
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])
-        self._hold_reassigned()
+        for name, where in self.again.items():
+            if name in self.names:
+                self.program.hold(self.names[name], f'{name} is set anew at {where}')
         return self.program
 
     def _declare(self) -> None:
         """Take in the variables that are set to a pose or to joint positions."""
-        self.counts: dict[str, int] = {}
+        self.again = self.set_again(_ASSIGNED)
         for result in _ASSIGNED.finditer(self.text):
-            name = result[2]
-            self.counts[name] = self.counts.get(name, 0) + 1
-            if re.match(r'(?:p\s*)?\[', self.text[result.end() :]) is None:
+            name = result[1]
+            if result[2] or re.match(r'(?:p\s*)?\[', self.text[result.end() :]) is None:
                 continue
             opening = self.text.index('[', result.end())
             try:
@@ -87,12 +93,7 @@ class UrscriptReader(Reader):
                 continue  # A list of something else; a move to it is refused where it stands.
             if point is not None and name not in self.names:
                 self.names[name] = point
-                self.used.add(result.start(2))
-
-    def _hold_reassigned(self) -> None:
-        for name, point in self.names.items():
-            if self.counts.get(name, 0) > 1:
-                self.program.hold(point, f'{name} is set more than once')
+                self.used.add(result.start(1))
 
     def _statement(self, result: re.Match[str]) -> None:
         opening = result.start(5)
@@ -110,12 +111,12 @@ class UrscriptReader(Reader):
     def _tool(self, start: int, end: int) -> Frame:
         first = self.pieces(start, end)[0]
         try:
-            numbers = self._numbers(*first, 6)
+            value = self._frame(*first)
         except DataError:
-            numbers = None
-        if numbers is None:
-            return Frame(self.source.text[slice(*first)] or 'of set_tcp')
-        return Frame('', UR_POSE.value([n.value for n in numbers]))
+            value = None
+        return Frame(
+            self.source.text[slice(*first)] or 'of set_tcp' if value is None else '', value
+        )
 
     def _move(self, word: str, where: str, start: int, end: int) -> None:
         kind, order = MOVES[word]
@@ -175,24 +176,28 @@ class UrscriptReader(Reader):
 
     def _near(self, parts: Sequence[tuple[int, int]]) -> tuple[Ref, Suits | None] | None:
         point = self._point(*parts[0])
+        if len(parts) > 4 or any(self.text.startswith('tcp', part[0]) for part in parts):
+            return None  # It is reached with another tool.
         if point is None or len(parts) < 2:
             return None if point is None else (Ref(point), None)
         first, last = parts[1]
         named = re.match(r'qnear\s*=\s*', self.text[first:last])
-        near = self._constant(self._point(first + (named.end() if named else 0), last), 1)
+        near = self._constant(first + (named.end() if named else 0), last, 1)[1]
         return (Ref(point), None) if near is None else (Ref(point), nearest(near))
 
     def _frame(self, start: int, end: int) -> Array | None:
         """Return a pose that stands there, or of a variable that is set once."""
-        point = self._point(start, end)
+        point, value = self._constant(start, end, 2)
         if point is not None:
             self.program.hold(point, 'it is a frame of other points')
-        return self._constant(point, 2)
+        return value
 
-    def _constant(self, point: int | None, ndim: int) -> Array | None:
-        """Return a pose (2) or joint positions (1) of a point; None where it is something else."""
+    def _constant(self, start: int, end: int, ndim: int) -> tuple[int | None, Array | None]:
+        """Return a point, and its pose (2) or joints (1); None where that changes, or is none."""
+        point = self._point(start, end)
         value = None if point is None else self.program.points[point].value
-        return value if value is not None and value.ndim == ndim else None
+        fits = value is not None and value.ndim == ndim and self.text[start:end] not in self.again
+        return point, value if fits else None
 
     def _point(self, start: int, end: int) -> int | None:
         """Return the point of a literal or a variable; None for anything worked out."""

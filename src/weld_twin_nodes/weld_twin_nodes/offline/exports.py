@@ -152,7 +152,7 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
     del notes
     robot = model.robot
-    offsets = joint_offsets(robot, _causes(model)) + _zeros(model)
+    offsets = joint_offsets(robot, _lasting(model)) + _zeros(model)
     turned, rows = model.turned, []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
@@ -169,7 +169,7 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(path, [_EVERYTHING, *_mended(model), *notes], _causes(model))
+    _write_effects(path, [_EVERYTHING, *_mended(model), *notes], _lasting(model))
 
 
 def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
@@ -216,7 +216,7 @@ def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, remaining = corrected(based, (*_causes(model), *_changes(model)))
+    robot, remaining = corrected(based, (*_lasting(model), *_changes(model)))
     # What the file has for use by itself, the effects that go with it take back.
     remaining = (*remaining, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
     zeros = _zeros(model)
@@ -265,9 +265,9 @@ def _readings(model: Model) -> list[str]:
     return [*reported, 'The numbers below take readings in which that is mended.']
 
 
-def _causes(model: Model) -> tuple[Effect, ...]:
-    """Return the effects of robot and cell; how a set-up moved is of no use elsewhere."""
-    return of_the_robot([effect for effect in model.known + model.found if effect.traits.cause])
+def _lasting(model: Model) -> tuple[Effect, ...]:
+    """Return what robot and cell have, curves too; how a set-up moved is of no use elsewhere."""
+    return of_the_robot(model.known + model.found)
 
 
 def _write_effects(path: Path, notes: Sequence[str], effects: Sequence[Effect]) -> None:

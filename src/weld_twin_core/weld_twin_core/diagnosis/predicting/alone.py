@@ -66,22 +66,27 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
     out = Alone((), recorded, unseen, whole, shrink.rms_after_m)
     if not _left(model):
         return out
-    start = _freed(constants, many=many)
     scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3.0)))
-    precision = effect_precision(start)
-    own = fit(problem, start, scale, precision, STEPS)
-    ways = Unseen.of(problem, scale, own, precision).every_way()
-    tried = max(each.rms(each.whole) for each in ways)
-    if tried >= LEAST_GAIN * unseen:
+    best, left = None, unseen
+    # Aligned frames mean nothing of the arm, so they are where they do best.
+    for start, gain in ((_framed(constants), 1.0), (_freed(constants, many=many), LEAST_GAIN)):
+        precision = effect_precision(start)
+        if not problem.frame_count + precision.size:
+            continue
+        own = fit(problem, start, scale, precision, STEPS)
+        ways = Unseen.of(problem, scale, own, precision).every_way()
+        tried = max(each.rms(each.whole) for each in ways)
+        if tried < gain * left:
+            best, left = own.model, tried
+    if best is None:
         return out
-    changes = _changes(constants, own.model)
-    return Alone(changes, _rms(problem, own.model, good), tried, whole, shrink.rms_after_m)
+    changes = _changes(constants, best)
+    return Alone(changes, _rms(problem, best, good), left, whole, shrink.rms_after_m)
 
 
 def _left(model: Model) -> tuple[Effect, ...]:
     """Return what a robot file cannot hold of the arm and its cell."""
-    causes = [effect for effect in model.known + model.found if effect.traits.cause]
-    return corrected(model.robot, of_the_robot(causes))[1]
+    return corrected(model.robot, of_the_robot(model.known + model.found))[1]
 
 
 def _constants(model: Model) -> Model:
@@ -89,10 +94,20 @@ def _constants(model: Model) -> Model:
     remaining = {id(effect) for effect in _left(model)}
     held = tuple(
         effect
-        for effect in of_the_robot([e for e in model.known + model.found if e.traits.cause])
+        for effect in of_the_robot(model.known + model.found)
         if id(effect) not in remaining and isinstance(effect, ChannelError | FrameError)
     )
     return replace(model, known=(), found=held)
+
+
+def _framed(constants: Model) -> Model:
+    """
+    Return the model with nothing to be fitted but aligned frames.
+
+    Frames fitted beside a spring or a ratio are not where they are without it. What they take up by
+    themselves is no zero's: zeros that a small motion cannot tell from frames do harm elsewhere.
+    """
+    return replace(constants, known=constants.found, found=())
 
 
 def _freed(constants: Model, *, many: bool) -> Model:

@@ -151,6 +151,45 @@ def test_what_is_no_correction_is_refused(cell):
     assert said.code == 2 and 'correction.json' in said.err and said.err.count('\n') == 1
 
 
+def test_a_program_that_another_diagnosis_corrected_is_refused(cell, tmp_path):
+    model = tmp_path / 'diagnosis.json'
+    model.write_text((cell / 'found' / 'diagnosis.json').read_text() + ' ')
+    words = ('--model', model, '--program', cell / 'better')
+    said = weld_twin('verify', cell / 'before', *words)
+    assert said.code == 2 and 'another diagnosis' in said.err and said.err.count('\n') == 1
+
+
+def test_what_was_corrected_is_not_corrected_twice(cell, tmp_path):
+    words = ('--robot', cell / 'robot.yaml', '--model', cell / 'found' / 'diagnosis.json', '--out')
+    written = (cell / 'better' / FILES[0]).read_bytes()
+    said = weld_twin('correct', cell / 'better' / FILES[0], *words, cell / 'better')
+    assert said.code == 2 and 'corrected already' in said.err and said.err.count('\n') == 1
+    assert (cell / 'better' / FILES[0]).read_bytes() == written
+    assert weld_twin('correct', cell / 'before', *words, tmp_path / 'bag').code == 0
+    said = weld_twin('correct', tmp_path / 'bag', *words, tmp_path / 'again')
+    assert said.code == 2 and 'corrected already' in said.err and not (tmp_path / 'again').exists()
+
+
+@pytest.mark.parametrize(
+    ('part', 'value'),
+    [('schema', 'weld_twin/diagnosis/9'), ('unsound', True), ('verdict', [1]), ('model', 'x')],
+)
+def test_a_diagnosis_of_another_version_or_shape_is_refused(part, value, cell, tmp_path):
+    content = json.loads((cell / 'found' / 'diagnosis.json').read_text())
+    (tmp_path / 'd.json').write_text(json.dumps(content | {part: value}))
+    words = (
+        '--robot',
+        cell / 'robot.yaml',
+        '--model',
+        tmp_path / 'd.json',
+        '--out',
+        tmp_path / 'o',
+    )
+    said = weld_twin('correct', MADE / FILES[0], *words)
+    assert said.code == 2 and said.err.count('\n') == 1 and 'd.json' in said.err
+    assert not (tmp_path / 'o').exists()
+
+
 def test_history_keeps_whether_the_promise_was_kept(cell, tmp_path):
     pytest.importorskip('sqlalchemy')
     recording = measured(stations(7, 20), OFF * [0, 0, 0, 1, 0, 0], 7)

@@ -23,7 +23,10 @@ from weld_twin_core.twin.twin import Twin
 
 from .yaml_file import whole
 
-SCHEMA_PREFIX = 'weld_twin/diagnosis/'
+SCHEMAS = tuple(f'weld_twin/diagnosis/{version}' for version in (1, 2))
+"""Versions that are read."""
+PARTS = {'model': dict, 'verdict': dict, 'unsound': list, 'posterior': dict, 'inputs': list}
+"""What parts of a diagnosis are; each may be missing, or null."""
 SIZE_LIMIT = 64_000_000
 """Bytes; a diagnosis of thousands of stations is some hundred kilobytes."""
 
@@ -45,11 +48,14 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ModelError(f"diagnosis '{path}' is not JSON: {error}") from None
     schema = data.get('schema') if isinstance(data, dict) else None
-    if not isinstance(data, dict) or not str(schema).startswith(SCHEMA_PREFIX):
+    if not isinstance(data, dict) or schema not in SCHEMAS:
         raise ModelError(
-            f"'{path}' is no diagnosis: its schema is {schema!r}, expected {SCHEMA_PREFIX}1; give "
-            'the diagnosis.json that weld-twin diagnose wrote'
+            f"'{path}' is no diagnosis of this version: its schema is {schema!r}, known are "
+            f'{" and ".join(SCHEMAS)}; give the diagnosis.json that weld-twin diagnose wrote'
         )
+    for part, kind in PARTS.items():
+        if not isinstance(data.get(part), kind | type(None)):
+            raise ModelError(f"diagnosis '{path}': {part} was changed and means nothing any more")
     return data
 
 
@@ -109,7 +115,7 @@ def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
 
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:
     wrong = content.get('unsound')
-    if isinstance(wrong, list) and wrong and isinstance(wrong[0], dict):
+    if wrong and isinstance(wrong[0], dict):
         reported = str(wrong[0].get('sentence', '')).rstrip('.')
         return f"diagnosis '{path}' holds no model, for its data were unsound: {reported}"
     return f"diagnosis '{path}' holds no model; make it anew with diagnose"
@@ -130,10 +136,9 @@ def _refuse_other_robot(robot: Robot, path: Path | str, model: dict[str, Any]) -
 
 def _applied(content: dict[str, Any]) -> list[dict[str, Any]]:
     """Return what was wrong with the data of a diagnosis and was undone, in its order."""
-    items = content.get('unsound')
     return [
         item
-        for item in (items if isinstance(items, list) else ())
+        for item in content.get('unsound') or ()
         if isinstance(item, dict) and item.get('applied')
     ]
 

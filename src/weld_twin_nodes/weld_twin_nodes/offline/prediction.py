@@ -225,6 +225,8 @@ def sureness_sentences(model: Predictor, got: Written) -> list[str]:
     return out
 
 
+COMPENSATED = 'compensated_with'
+"""Key of the provenance of commands that are corrected: by which effects."""
 WHOLE = 0.999
 """Share of a correction that counts as all of it."""
 
@@ -297,7 +299,7 @@ def write_compensated(
         twin=(poses.position, poses.rotation),
         expected=made.model.expected(commands),
         storage=storage,
-        provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
+        provenance={COMPENSATED: [effect.to_mapping() for effect in twin.effects]},
         beside=beside_bag(made.model, made.outside),
     )
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.program_correction import Caps
+from weld_twin_msgs_py.bags import provenance
+from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
 from weld_twin_msgs_py.programs.languages import language_of
 from weld_twin_msgs_py.programs.source import read_source
@@ -34,7 +36,23 @@ def run(given: Given) -> int:
         given.refuse(of_program, f"is of a program; '{given.program}' is a bag")
         return _corrected_bag(given)
     given.refuse(names_of(TOPICS), f"is of a bag; '{given.program}' is none")
+    if given.model:
+        _refuse_corrected(what)
     return _corrected_program(given)
+
+
+def _refuse_corrected(program: Path) -> None:
+    """Refuse a program that a correction wrote: its points would be moved a second time."""
+    beside = program.resolve().with_name(RESULT)
+    try:
+        content = read_json(beside)
+    except DataError:
+        return
+    if content.get('program') == program.name and content.get('moves'):
+        raise DataError(
+            f"'{program}' was corrected already, as '{beside.name}' beside it says, and would be "
+            'corrected twice; give the program as it was before'
+        )
 
 
 def _corrected_bag(given: Given) -> int:
@@ -43,6 +61,11 @@ def _corrected_bag(given: Given) -> int:
 
     if not given.model:
         raise DataError('say with --model by which effects the commands are corrected')
+    if prediction.COMPENSATED in provenance(given.program):
+        raise DataError(
+            f"the commands of '{given.program}' were corrected already, and would be corrected "
+            'twice; give the bag as it was before'
+        )
     robot = given.load_robot()
     robot.refuse_positioner('a compensated motion')
     recording = given.read_bag(given.program, robot)

@@ -35,7 +35,7 @@ def run(given: Given) -> int:
         content,
         model,
         recording,
-        correction=_correction(given.program) if given.program else None,
+        correction=_correction(given.program, given.model) if given.program else None,
         align=given.align,
         setup=given.setup - 1,
     )
@@ -71,12 +71,19 @@ def _robot(given: Given, content: dict[str, Any]) -> Robot:
         ) from None
 
 
-def _correction(folder: str) -> dict[str, Any]:
+def _correction(folder: str, model: str) -> dict[str, Any]:
     path = Path(folder)
     path = path / CORRECTION if path.is_dir() else path
     content = read_json(path)
     if not isinstance(content.get('expected'), dict):
         raise DataError(
             f"'{path}' is no correction; give the folder that weld-twin correct --model wrote"
+        )
+    (own,) = inputs_of(model=model)
+    made = [item['sha256'] for item in content.get('inputs', ()) if item['use'] == own.use]
+    if made not in ([], [own.sha256]):
+        raise DataError(
+            f"the program of '{path}' was corrected by another diagnosis than '{model}'; give that "
+            'one, for it made the promise'
         )
     return content

@@ -35,16 +35,32 @@ def inverted(matrix: Array) -> Array:
 
     Raises LinAlgError: the matrix is not positive definite.
     """
-    # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
-    lower = dpotri(_factor(matrix), lower=1, overwrite_c=1)[0]
-    out: Array = np.tril(lower, -1)
-    out += out.T
-    out[np.diag_indices_from(out)] = lower.diagonal()
+    return inverse_of(root_of(matrix))
+
+
+def inverse_of(root: Array) -> Array:
+    """
+    Return the inverse of a matrix by its root, which is overwritten, shape (P, P).
+
+    root: as `root_of` returns it.
+    """
+    lower = dpotri(root, lower=1, overwrite_c=1)[0]
+    out: Array = lower + lower.T  # above its diagonal the root is empty
+    diagonal = np.einsum('ii->i', out)
+    diagonal *= 0.5
     return out
 
 
-def _factor(matrix: Array, *, clean: bool = False) -> Array:
-    """Return the lower triangle of a factor, in the place of a matrix."""
+def root_of(matrix: Array, *, clean: bool = True) -> Array:
+    """
+    Return the lower triangle L of a matrix L L', in its place.
+
+    matrix: symmetric, in C order, shape (P, P); overwritten.
+    clean: what is above the triangle is empty, and not left as it was.
+
+    Raises LinAlgError: the matrix is not positive definite.
+    """
+    # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
     factor, failed = dpotrf(matrix.T, lower=1, clean=clean, overwrite_a=1)
     if failed:
         raise LinAlgError('the matrix is not positive definite')
@@ -61,7 +77,7 @@ def factored(matrix: Array) -> Callable[[Array], Array]:
     """
     if not matrix.size:
         return np.array
-    factor = _factor(matrix)
+    factor = root_of(matrix, clean=False)
 
     def solve(right: Array) -> Array:
         return np.asarray(dpotrs(factor, right, lower=1)[0])
@@ -91,7 +107,7 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
 
     Raises LinAlgError: the matrix is not positive definite.
     """
-    factor = _factor(matrix, clean=True)
+    factor = root_of(matrix)
     solution, _ = dpotrs(factor, right, lower=1)
     upper = dtrtri(factor, lower=1, overwrite_c=1)[0].T  # rows that lie together
     return solution, np.einsum('ik,ik->i', upper, upper)

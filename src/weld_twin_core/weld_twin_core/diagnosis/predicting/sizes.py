@@ -23,15 +23,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import log
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.linalg.blas import dger
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.blas import dgemm, dger
+from scipy.linalg.lapack import dtrtrs
 
 from ...arrays import Array
+from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import NOISE_TRUST
 
 SIZES = np.array([0.0001, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
@@ -151,9 +152,10 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
 
 def with_prior(information: Array) -> Array:
     """Return the data's information with a prior of unit width added, in its place."""
-    diagonal = np.diag_indices_from(information)
+    diagonal = np.einsum('ii->i', information)
     # Each by its own rounding: that of the largest entry would outweigh the prior of the others.
-    information[diagonal] = information[diagonal] * (1.0 + 1e-14) + 1.0
+    diagonal *= 1.0 + 1e-14
+    diagonal += 1.0
     return information
 
 
@@ -231,25 +233,29 @@ class _Chain:
     def _solved(self) -> tuple[Array, Array]:
         """Return the root of the information in units of the sizes, and what it turns the pull into."""
         size = self.size
-        system = with_prior(self.normal * np.outer(size, size) / self.noise)
-        lower = cholesky(system, lower=True, check_finite=False)
+        system = np.outer(size, size)
+        system *= self.normal
+        system /= self.noise
+        lower = root_of(with_prior(system))
         wanted = size * self.right / self.noise + self.middle / size
-        return lower, solve_triangular(lower, wanted, lower=True, check_finite=False)
+        return lower, dtrtrs(lower, wanted, lower=1)[0]
 
     def _coordinates(self, lower: Array, half: Array) -> Array:
         """Return the coordinates of solutions that are half done (P, K), shape (K, P)."""
-        ends = solve_triangular(lower, half, lower=True, trans=1, check_finite=False)
-        return np.asarray(self.size * ends.T)
+        return np.asarray(self.size * dtrtrs(lower, half, lower=1, trans=1)[0].T)
 
     def _covariance(self, lower: Array) -> Array:
-        inverse, _ = dpotri(lower, lower=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        return np.asarray(inverse * np.outer(self.size, self.size))
+        """Return the covariance of the coordinates by a root of the information, which is used up."""
+        covariance = inverse_of(lower)
+        covariance *= self.size
+        covariance *= self.size[:, None]
+        return covariance
 
     def _look(self, lower: Array, mean: Array) -> None:
         seen, size = self.seen, self.size
         seen.mean += mean
-        seen.square += self._covariance(lower) + np.outer(mean, mean)
+        seen.square += self._covariance(lower)
+        seen.square += np.outer(mean, mean)
         seen.precision += size**-2.0
         seen.variance += size**2
         usual, gear = size[self.counted] >= USUAL, self.prior.gears[self.prior.group[self.counted]]
@@ -275,24 +281,27 @@ class _Chain:
         """
         lower, half = self._solved()
         (mean,) = self._coordinates(lower, half[:, None])
-        covariance = np.asfortranarray(self._covariance(lower))
+        covariance = self._covariance(lower).T  # as BLAS wants it
         for group in self.tied:
             self._shared_size(group, mean, covariance)
         each = self.rng.permutation(np.flatnonzero(self.single))
         luck = np.log(self.belief)[self.prior.group[each]]
         luck += self.rng.gumbel(size=luck.shape)
-        squares = SIZES**2
-        for j, likely in zip(each, luck, strict=True):
-            old, variance, middle = self.size[j] ** -2.0, covariance[j, j], self.middle[j]
-            seen = max(1.0 / variance - old, 0.0)
-            pull = (mean[j] - middle) / variance
-            grown = 1.0 + squares * seen
-            likely += 0.5 * (pull**2 * squares / grown - np.log(grown))
-            self.size[j] = SIZES[likely.argmax()]
-            more = self.size[j] ** -2.0 - old
+        squares = (SIZES**2).tolist()
+        for j, own in zip(each.tolist(), luck.tolist(), strict=True):
+            # Numbers of Python: there are eight sizes, and an array costs as much as a hundred.
+            old, variance = float(self.size[j]) ** -2.0, float(covariance[j, j])
+            seen, off = max(1.0 / variance - old, 0.0), float(mean[j] - self.middle[j])
+            pull = (off / variance) ** 2
+            likely = [
+                one + 0.5 * (pull * square / (1.0 + square * seen) - log(1.0 + square * seen))
+                for square, one in zip(squares, own, strict=True)
+            ]
+            self.size[j] = SIZES[likely.index(max(likely))]
+            more = float(self.size[j]) ** -2.0 - old
             if more != 0.0:
                 factor, column = more / (1.0 + more * variance), covariance[:, j].copy()
-                mean -= factor * (mean[j] - middle) * column
+                mean -= factor * off * column
                 dger(-factor, column, column, a=covariance, overwrite_a=1)
 
     def _shared_size(self, group: NDArray[np.int_], mean: Array, covariance: Array) -> None:
@@ -315,7 +324,8 @@ class _Chain:
             factor = more / (1.0 + more * variance)
             columns = columns @ turn
             mean -= columns @ (factor * (turn.T @ off))
-            covariance -= (columns * factor) @ columns.T
+            scaled = (columns * factor).T
+            dgemm(-1.0, columns.T, scaled, 1.0, covariance, trans_a=1, overwrite_c=1)
 
     def _usual(self) -> None:
         """Draw how often each size comes in every family."""

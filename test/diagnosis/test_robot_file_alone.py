@@ -18,6 +18,8 @@ import yaml
 from diagnosis_cells import ELSE
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects.dated import JointSlip, ToolSlip
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.programs.plain_arm import _frames, tool_pose
@@ -26,6 +28,7 @@ from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.robots import read_robot_yaml, write_robot_yaml
 from weld_twin_nodes.cli import main
+from weld_twin_nodes.offline.exports import write_all
 
 LOAD, YIELDS, LONGER, G = 12.0, 4e-6, 5e-4, 9.80665
 """Load [kg], what joint 2 yields [rad/(N m)], how much link 2 is longer [m]."""
@@ -147,6 +150,17 @@ def test_frames_fitted_beside_curves_are_fitted_anew_for_the_file(uneven):
     assert whole < 0.5 * before
     # The file is told by the way of leaving data out in which it does worst.
     assert alone < 1.1 * before
+
+
+def test_files_say_that_they_have_the_tool_as_it_was_before_it_slipped(tmp_path):
+    slip = ToolSlip(xyz=[5e-4, 0.0, 0.0], time=12.0)
+    model = Model(NOMINAL, (np.eye(4),), found=(slip, JointSlip('joint_2', 1e-3, 7.0)))
+    write_all(tmp_path, model)
+    for name in ('robot.yaml', 'robot.urdf', 'effects.yaml', 'robot_effects.yaml'):
+        text = (tmp_path / name).read_text()
+        assert 'at t = 12 s stays with the set-up' in text, name
+        assert 'the tool is taken as it was before' in text, name
+        assert 't = 7 s' not in text, name
 
 
 def test_page_says_which_file_to_take(found):

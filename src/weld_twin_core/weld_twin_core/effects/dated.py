@@ -281,6 +281,16 @@ def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(e for e in (effect.twin.lasting() for effect in effects) if e is not None)
 
 
+def left_behind(effects: Sequence[Effect]) -> list[str]:
+    """Return which causes `of_the_robot` leaves with the set-up that had them, in sentences."""
+    return [
+        f'{effect.traits.title} at t = {effect.time:.4g} s stays with the set-up that was recorded: '
+        f'the {effect.channel} is taken as it was before that.'
+        for effect in effects
+        if isinstance(effect, _SuddenFrame)
+    ]
+
+
 def seen_from(
     effects: Sequence[Effect], epoch_ns: int, span_ns: tuple[int, int], other: Recording
 ) -> tuple[Effect, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.dated import of_the_robot
+from weld_twin_core.effects.dated import left_behind, of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_core.twin.posterior import Posterior
@@ -88,7 +88,7 @@ def file_alone(alone: Alone, *, left: bool) -> list[str]:
         'not fitted'
     )
     if not left:
-        return [f'This file holds all that was found, and leaves {by_itself} (RMS).']
+        return [f'This file holds all that was found of the robot, and leaves {by_itself} (RMS).']
     out = [
         f'This file alone leaves {by_itself} (RMS). The whole model (diagnosis.json, or this file '
         f'with robot_effects.yaml) leaves {_mm(alone.whole_recorded_m)} and '
@@ -169,12 +169,16 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(path, [_EVERYTHING, *_mended(model), *notes], _lasting(model))
+    _write_effects(
+        path, [_EVERYTHING, *_mended(model), *_left_behind(model), *notes], _lasting(model)
+    )
 
 
 def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the effects that the corrected robot cannot hold."""
-    _write_effects(path, [_LEFT_OVER, *_readings(model), *notes], _corrected(model)[1])
+    _write_effects(
+        path, [_LEFT_OVER, *_readings(model), *_left_behind(model), *notes], _corrected(model)[1]
+    )
 
 
 FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
@@ -211,7 +215,7 @@ def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: Give
 def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
     """Return the head of a robot file: what it leaves by itself, and where the model holds."""
     own = [] if model.alone is None else file_alone(model.alone, left=bool(_corrected(model)[1]))
-    return [*own, *_readings(model), *notes]
+    return [*own, *_readings(model), *_left_behind(model), *notes]
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
@@ -263,6 +267,10 @@ def _readings(model: Model) -> list[str]:
             'That is in the numbers below: they take the readings as they were recorded.',
         ]
     return [*reported, 'The numbers below take readings in which that is mended.']
+
+
+def _left_behind(model: Model) -> list[str]:
+    return left_behind(model.known + model.found)
 
 
 def _lasting(model: Model) -> tuple[Effect, ...]:

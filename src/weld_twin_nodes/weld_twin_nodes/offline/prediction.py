@@ -21,6 +21,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects.dated import left_behind
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.recording import JointMotion, Recording
@@ -75,7 +76,7 @@ class Predictor(NamedTuple):
     source: Recording | None = None
     """The recording that it is for, mended as the diagnosis mended its own; None where nothing had
     to be."""
-    remark: str = ''  # what is to be said of that
+    remark: str = ''  # what is to be said of that, and of what stays with the set-up recorded
 
     def expected(self, recording: Recording) -> tuple[Poses, Array] | None:
         """Return where all models allowed have the tool at every joint state, and how sure that is."""
@@ -138,6 +139,8 @@ def predictor(
     clocks = place if place is not None else -1 if recording.measured is None else chosen
     source, reported = mended_source(model, robot, recording, clocks)
     twin = timed(path, model, chosen, source)
+    if len(twin.effects) < len(model.twin(chosen).effects):
+        reported = ' '.join([reported, *left_behind(model.found)]).strip()
     return Predictor(twin, read_posterior(robot, path), chosen, source, reported)
 
 

@@ -158,15 +158,15 @@ def fit(
     most: stops where a step is foretold to leave more than this, whitened squares.
     """
     prior = effect_precision(model) if precision is None else precision
-    here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance, most)
+    start = _Point.at(problem, model, scale, prior)
+    columns = start.columns()
+    here = _descended(start, columns, iterations, tolerance, most)
     if problem.at_rest and here.believed > STRAINED and scale.position > LEAST_NOISE:
         # What a cause that is not fitted yet leaves was taken for noise, beside which few stations
         # weigh less than a belief.
-        share = (LEAST_NOISE / scale.position) ** 2
-        start = _Point.at(problem, model, scale, prior, share)
-        here = min(
-            here, _descended(start, iterations, tolerance, most), key=lambda one: one.surprise
-        )
+        start = start.believing((LEAST_NOISE / scale.position) ** 2)
+        other = _descended(start, columns, iterations, tolerance, most)
+        here = min(here, other, key=lambda one: one.surprise)
     return Fit(here.model, here.residual)
 
 
@@ -183,9 +183,11 @@ def foretold(
     return start.residual, start.cost - float(right @ solve_scaled(normal, right, DAMPING))
 
 
-def _descended(start: _Point, iterations: int, tolerance: float, most: float) -> _Point:
-    """Return the place that Levenberg and Marquardt lead to."""
-    here, damping, columns = start, DAMPING, start.columns()
+def _descended(
+    start: _Point, columns: Columns, iterations: int, tolerance: float, most: float
+) -> _Point:
+    """Return the place that Levenberg and Marquardt lead to from a start with its columns."""
+    here, damping = start, DAMPING
     for _ in range(iterations):
         there, (normal, right) = None, here.normal_equations(columns)
         while damping < DAMPED:
@@ -224,16 +226,20 @@ class _Point:
     share: float = 1.0
 
     @classmethod
-    def at(
-        cls, problem: Problem, model: Model, scale: Scale, prior: Array, share: float = 1.0
-    ) -> _Point:
-        """Return the cost of a model under a prior about zero, (K,), of which a share counts."""
+    def at(cls, problem: Problem, model: Model, scale: Scale, prior: Array) -> _Point:
+        """Return the cost of a model under a prior about zero, shape (K,)."""
         residual = problem.whitened(problem.residuals(model), scale)
         frames, off = frame_prior(problem, model)
-        ridge = share * np.concatenate([frames, prior])
+        ridge = np.concatenate([frames, prior])
         x = np.concatenate([off, coordinates(model)])
         cost = float(residual @ residual + ridge @ x**2)
-        return cls(problem, scale, prior, model, residual, ridge, x, cost, share)
+        return cls(problem, scale, prior, model, residual, ridge, x, cost)
+
+    def believing(self, share: float) -> _Point:
+        """Return the same where only a share of all priors counts."""
+        ridge = share * self.ridge
+        cost = float(self.residual @ self.residual + ridge @ self.x**2)
+        return replace(self, ridge=ridge, cost=cost, share=share)
 
     def columns(self) -> Columns:
         """Return the columns of frames and effects here."""
@@ -249,7 +255,8 @@ class _Point:
     def stepped(self, step: Array) -> _Point:
         """Return the model after a step of frames and coordinates."""
         model = stepped(self.problem, self.model, step)
-        return _Point.at(self.problem, model, self.scale, self.prior, self.share)
+        there = _Point.at(self.problem, model, self.scale, self.prior)
+        return there if self.share == 1.0 else there.believing(self.share)
 
     @property
     def believed(self) -> float:

@@ -171,6 +171,29 @@ def test_what_was_corrected_is_not_corrected_twice(cell, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ('robot', 'model'),
+    [('robot.yaml', 'effects.yaml'), ('robot.urdf', 'effects.yaml'), ('', 'robot_effects.yaml')],
+)
+def test_effects_go_with_the_robot_that_their_file_names(robot, model, cell, tmp_path):
+    arm = cell / 'found' / robot if robot else cell / 'robot.yaml'
+    words = ('--robot', arm, '--model', cell / 'found' / model, '--out', tmp_path / 'out')
+    said = weld_twin('correct', MADE / FILES[0], *words)
+    assert (
+        said.code == 2 and 'does not go with the robot' in said.err and said.err.count('\n') == 1
+    )
+
+
+@pytest.mark.parametrize('robot', ['robot.yaml', 'robot.urdf'])
+def test_a_program_is_corrected_for_the_numbers_that_the_controller_has(robot, cell, tmp_path):
+    (tmp_path / 'play.yaml').write_text('[{effect: joint_offset, joint: joint_a5, offset: 1e-3}]')
+    words = ('--model', tmp_path / 'play.yaml', '--out', tmp_path / 'out')
+    said = weld_twin('correct', MADE / FILES[0], '--robot', cell / 'found' / robot, *words)
+    assert said.code == 0 and 'for a controller that works with them' in said.out, said.err
+    said = weld_twin('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml', *words)
+    assert said.code == 0 and 'works with them' not in said.out
+
+
+@pytest.mark.parametrize(
     ('part', 'value'),
     [('schema', 'weld_twin/diagnosis/9'), ('unsound', True), ('verdict', [1]), ('model', 'x')],
 )

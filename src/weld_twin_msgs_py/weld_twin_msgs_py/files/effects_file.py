@@ -4,15 +4,28 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import Effect, effects_from_list
 from weld_twin_core.errors import ModelError
 
 from .whole_files import write_text
 from .yaml_file import read_yaml, yaml_text
+
+_HEAD = re.compile(r'^# (Not |)for kinematics ([0-9a-f]{16})\b', re.M | re.I)
+
+
+def head_of(nominal: Robot, *, corrected: bool) -> str:
+    """
+    Return the comment by which an effects file says which robot it goes with.
+
+    nominal: the robot that was diagnosed. corrected: it goes with a corrected one instead.
+    """
+    return f'{"Not for" if corrected else "For"} kinematics {fingerprint(nominal)}'
 
 
 def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
@@ -22,11 +35,19 @@ def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
     Raises
     ------
     ModelError
-        The file cannot be read, is malformed, or names an effect the robot cannot have; the
-        message names file and entry.
+        The file cannot be read, is malformed, names an effect the robot cannot have, or says that
+        it goes with another robot; the message names file and entry.
 
     """
     entries = read_yaml(path, 'effects file')
+    for word, kinematics in _HEAD.findall(
+        Path(path).read_text(encoding='utf-8', errors='replace')
+    ):
+        if (kinematics == fingerprint(robot)) == (word == 'Not '):
+            raise ModelError(
+                f"effects file '{path}' does not go with the robot {robot.name!r} that was given: it "
+                f'goes with {"a corrected" if word else "the nominal"} one, as its first line says'
+            )
     try:
         return effects_from_list(entries, robot)
     except ModelError as error:

@@ -18,7 +18,7 @@ from weld_twin_core.errors import ModelError
 
 from .axes_to_dh import Axis, dh_rows, inverse
 from .controller_links import FLANGE, FixedLink, flange_link_of, foot_of
-from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
+from .urdf_tree import CORRECTED, MOVABLE, Joint, Tree, parse_tree, read_tree
 
 _TURN = 2.0 * np.pi + 1e-6
 """A whole turn [rad], and what rounding may add."""
@@ -269,7 +269,7 @@ def _robot(
         mass=mass,
         com=com,
         gravity=T_base_first[:3, :3].T @ gravity,
-        source=f'URDF {Path(path).name}',
+        source=f'URDF {Path(path).name}' + (f'; {CORRECTED}' if tree.corrected else ''),
     )
 
 

@@ -67,12 +67,18 @@ class Joint(NamedTuple):
     mimic: bool
 
 
+CORRECTED = 'corrected by a diagnosis'
+"""What a corrected robot says of itself: where a robot file has its source, and a URDF a comment."""
+
+
 class Tree(NamedTuple):
     """A URDF: its name, links by name, and the joint above each link."""
 
     name: str
     links: dict[str, Link]
     above: dict[str, Joint]
+    corrected: bool = False
+    """A comment says that it holds the numbers of a diagnosis."""
 
     @property
     def roots(self) -> list[str]:
@@ -120,7 +126,7 @@ def parse_tree(text: str, path: Path | str) -> Tree:
         raise ModelError(f"'{path}' is a xacro file; run 'xacro {path}' to make the URDF of it")
     try:
         model = urdf.URDF.from_xml(_pruned(root), XmlPath('robot'))
-        return _tree(model)
+        return _tree(model)._replace(corrected=CORRECTED in text)
     except (ModelError, DataError) as error:
         raise ModelError(f"URDF '{path}': {error}") from None
     except Exception as error:  # the parser raises bare Exception and AssertionError

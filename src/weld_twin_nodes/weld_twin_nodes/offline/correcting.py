@@ -42,11 +42,16 @@ from weld_twin_msgs_py.programs import (
     to_moves,
 )
 from weld_twin_msgs_py.programs.source import Source
+from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
 
 from ..streams.supervision import Promise
 from .given_twin import build_twin, diagnosis_of, refuse_mended
 
 SCHEMA = 'weld_twin/correction/1'
+CORRECTED_ROBOT = (
+    'the robot file holds the numbers of a diagnosis: points are moved for a controller that works with '
+    'them; for one that works with the nominal ones give the nominal robot, and its diagnosis'
+)
 TOOL_LEFT = (
     'what was found of the tool was left out, for the program works with another tool than the '
     'one that was measured'
@@ -176,6 +181,8 @@ def _read_back(
 
 def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:
     out = [*program.notes, *context.controller.notes]
+    if CORRECTED in context.robot.source:
+        out.append(CORRECTED_ROBOT)
     tools = [
         context.controller.tool(step.tool)
         for step in program.steps

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.effects import Effect
@@ -18,10 +19,12 @@ from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_core.twin.posterior import Posterior
 from weld_twin_msgs_py.files.csv_text import csv_text
+from weld_twin_msgs_py.files.effects_file import head_of
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
+from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
 
 AS_GOOD = 1.1
 """Ratio of what a robot file leaves to what the whole model leaves up to which either may be taken: less
@@ -129,6 +132,7 @@ def left_open(posterior: Posterior) -> list[str]:
     ]
 
 
+_SAID = f'This robot is {CORRECTED}.'
 _EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
 _LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
 
@@ -141,7 +145,8 @@ def write_yaml(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a URDF."""
-    write_urdf(path, _corrected(model)[0], overwrite=True, notes=_of_the_robot(model, notes))
+    said = [_SAID, *_of_the_robot(model, notes)]
+    write_urdf(path, _corrected(model)[0], overwrite=True, notes=said)
 
 
 def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
@@ -169,16 +174,18 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
-    _write_effects(
-        path, [_EVERYTHING, *_mended(model), *_left_behind(model), *notes], _lasting(model)
-    )
+    pair = _pair(model, corrected=False)
+    head = [_EVERYTHING, *pair, *_mended(model), *_left_behind(model), *notes]
+    _write_effects(path, head, _lasting(model))
 
 
 def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the effects that the corrected robot cannot hold."""
-    _write_effects(
-        path, [_LEFT_OVER, *_readings(model), *_left_behind(model), *notes], _corrected(model)[1]
-    )
+    robot, remaining = _corrected(model)
+    changed = fingerprint(robot) != fingerprint(model.robot)
+    pair = _pair(model, corrected=True) if changed else []
+    head = [_LEFT_OVER, *pair, *_readings(model), *_left_behind(model), *notes]
+    _write_effects(path, head, remaining)
 
 
 FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
@@ -208,7 +215,7 @@ def write_all(
 
 def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: GivenUrdf) -> None:
     """Write the corrected robot as the URDF that it was read from, its names kept."""
-    robot, said = _corrected(model)[0], _of_the_robot(model, notes)
+    robot, said = _corrected(model)[0], [_SAID, *_of_the_robot(model, notes)]
     write_urdf_like(path, given, robot, overwrite=True, notes=said)
 
 
@@ -233,10 +240,15 @@ def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
             lower=robot.lower - zeros,
             upper=robot.upper - zeros,
         )
-    source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
+    source = f'{robot.source}; {CORRECTED}' if robot.source else CORRECTED
     if model.mended:
         source += f' of mended data: {" ".join(model.mended)}'
     return replace(robot, source=source), remaining
+
+
+def _pair(model: Model, *, corrected: bool) -> list[str]:
+    """Return with which robot an effects file goes; nothing where mending changed what was given."""
+    return [] if model.mends else [head_of(model.robot, corrected=corrected)]
 
 
 def _changes(model: Model) -> tuple[Effect, ...]:

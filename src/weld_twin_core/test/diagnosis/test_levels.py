@@ -276,6 +276,23 @@ def test_a_base_that_leans_to_one_side_alone_is_no_instrument():
     assert {cause.dependence[0][0] for cause in found.causes if cause.share > 0.1} == {'load'}
 
 
+def test_a_loose_tool_that_falls_to_its_lower_side_is_no_noise():
+    robot, rng = wt.load('ur5'), np.random.default_rng(4)
+    t = 20.0 * np.arange(60)
+    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
+    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    poses = wt.Twin(robot).poses(commanded, t)
+    side = poses.rotation[:, :, 0]
+    there = poses.position - 2.5e-4 * side * np.sign(side[:, 2:])
+    seen = commanded.with_measured(
+        wt.Measurements(t, there + [2.1, -1.3, 0.4] + rng.normal(scale=3e-5, size=there.shape))
+    )
+    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    assert found.status == 'unknown'
+    (cause,) = found.causes
+    assert (cause.place[0][0], cause.dependence[0][0]) == ('tool', 'load')
+
+
 def test_what_is_far_wider_than_noise_is_told_as_above_it():
     """A dent at one angle of a joint, seen at stations where nothing shows the noise by itself."""
     robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(6)

@@ -227,6 +227,8 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
             yield 'instrument', 'place', [_sighted(maker, knots) for maker in features], ()
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(maker) for maker in features], ()
+    elif not problem.untracked and features[0].view.robot.gravity.any():
+        yield 'tool', 'load', [_hanging(maker) for maker in features], ()
     if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
         yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
@@ -285,6 +287,22 @@ def _yielding(maker: Features) -> Array:
         force = np.einsum('mji,mj->mi', rotation, (axes @ force[..., None])[..., 0])
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
+    return out
+
+
+def _hanging(maker: Features) -> Array:
+    """
+    Return the tool pushed along its axes by what hangs on it, shape (9, 6, M).
+
+    A bracket sags, and a loose tool falls to its lower side: along any axis of the tool by how far
+    down each of its axes points.
+    """
+    rotation = maker.run.poses.rotation
+    down = np.asarray(maker.view.frames.root_rotation @ maker.view.robot.gravity)
+    weight = np.einsum('mji,mj->mi', rotation, np.broadcast_to(down, rotation.shape[:2]))
+    out = np.zeros((9, 6, len(rotation)))
+    for k, (axis, pulled) in enumerate(np.ndindex(3, 3)):
+        out[k, :3] = (rotation[:, :, axis] * weight[:, pulled, None]).T
     return out
 
 

@@ -13,7 +13,7 @@ from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.fit import design, effect_precision, frame_prior
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
-from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.plant.plant import run
@@ -22,17 +22,12 @@ from weld_twin_lab.plant.tracker import Tracker
 
 SIGMA = 2e-5
 SIGMA_TURN = 5e-5
-ELSE = (
-    'transmission_ripple',
-    'bearing_tilt',
-    'joint_coupling',
-    'friction',
-    'hysteresis',
-    'vibration',
-)
-ELSE += ('gear_ratio_by_direction', 'loaded_play', 'hose_pull', 'pedestal_tilt', 'servo_lag')
-"""Kinds of causes that need not be tried where it is about others: the fewer, the sooner."""
 HOME = (0.1, -1.2, 1.5, -1.0, -1.4, 0.3, 0.2)
+
+
+def all_but(*kinds):
+    """Return the kinds of causes that need not be tried where it is about others: fewer are sooner."""
+    return sorted(set(REGISTRY) - set(kinds))
 
 
 def effect(name, **values):

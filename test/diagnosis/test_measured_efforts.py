@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_cells import all_but
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
 from weld_twin_core.diagnosis.soundness.efforts import compared
@@ -31,12 +32,19 @@ CAUSES = [
     {'effect': 'joint_compliance', 'joint': joint, 'compliance': value}
     for joint, value in SOFT.items()
 ]
+KINDS = ('joint_compliance', 'joint_offset', 'gear_ratio', 'payload')
 SIGMA = 2e-5
 COUNT = 45
 
 
 def commanded(*words):
     return main([str(word) for word in words])
+
+
+def by_effort(folder):
+    words = ('diagnose', folder / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
+    words += ('--use-effort', '--exclude-effect', *all_but(*KINDS))
+    return commanded(*words, '--out', folder / 'found')
 
 
 def pulled(seed=3, payload=0.0):
@@ -66,8 +74,7 @@ def cell(tmp_path_factory):
     """A bag with the efforts, its diagnosis by them, and what was told."""
     folder = tmp_path_factory.mktemp('efforts')
     write_recording(folder / 'bag', pulled(), ROBOT)
-    words = ('diagnose', folder / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
-    assert commanded(*words, '--use-effort', '--out', folder / 'found') == 0
+    assert by_effort(folder) == 0
     return folder
 
 
@@ -133,8 +140,7 @@ def in_bag(tmp_path, effort, holds=True):
     value = recording.effort.value * (1.0 if holds else -1.0)
     told = replace(recording, effort=JointSignal(recording.effort.t, effort(value)))
     write_recording(tmp_path / 'bag', told, ROBOT)
-    words = ('diagnose', tmp_path / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
-    return commanded(*words, '--use-effort', '--out', tmp_path / 'found')
+    return by_effort(tmp_path)
 
 
 def test_a_payload_and_a_sign_show_in_the_efforts(tmp_path):

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_nodes.wording.words import DEPENDENCES, PLACES, STATUS
 
 ROOT = Path(__file__).parents[2]
@@ -52,11 +51,8 @@ def unexplained(label, words):
 
 
 @pytest.fixture(scope='module')
-def page(tmp_path_factory):
-    out = tmp_path_factory.mktemp('page') / 'found'
-    said = weld_twin('diagnose', ROOT / 'bags/elbow_play', '--robot', 'ur5', '--out', out)
-    assert said.code == 0
-    return (out / 'report.html').read_text(encoding='utf-8')
+def page(elbow_found):
+    return (elbow_found / 'report.html').read_text(encoding='utf-8')
 
 
 def test_every_label_of_the_page_is_explained(page):

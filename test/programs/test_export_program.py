@@ -85,6 +85,23 @@ def test_a_seam_is_followed_by_straight_pieces_to_a_twentieth_of_a_millimetre(
     assert len(points) < 100
 
 
+@pytest.mark.parametrize('language', CELLS)
+def test_a_name_is_a_comment_and_no_statement(language, tmp_path):
+    name = 'a\nDO[1]=ON ;x.yaml'
+    path, _ = stations(wt.load(CELLS[language][0]), tmp_path)
+    _, text, _, _ = exported(language, path.rename(tmp_path / name), tmp_path)
+    assert not re.search(r'^\W*DO\[1\]', text.replace(';', '\n'), re.M)
+
+
+def test_names_that_would_end_a_line_are_refused(tmp_path):
+    content = wt.load('ur5').to_mapping() | {'name': 'a\n$OUT[1]=TRUE'}
+    (tmp_path / 'robot.yaml').write_text(yaml.safe_dump(content))
+    words = ('--robot', tmp_path / 'robot.yaml', '--controller', 'urscript')
+    said = weld_twin('export', 'program', 'line', *words, '--out', tmp_path / 'p.script')
+    assert said.code == 2 and 'control character' in said.err and said.err.count('\n') == 1
+    assert not (tmp_path / 'p.script').exists()
+
+
 def test_the_first_run_is_slow_and_a_later_one_within_its_cap(tmp_path):
     def fastest(*more):
         _, text, _, _ = exported('krl', 'line', tmp_path, *more)

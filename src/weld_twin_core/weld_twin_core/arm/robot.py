@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -22,6 +23,7 @@ _CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """In the world frame [m/s^2], of a robot file that does not say."""
 _WORKPIECE_KEYS = {'name', 'convention', 'base', 'tool', 'joints', 'links', 'payload'}
+_UNSPOKEN = re.compile(r'[\x00-\x1f\x7f\x85\u2028\u2029]')
 _TOP_KEYS = _WORKPIECE_KEYS | {'gravity', 'source', 'plausible', 'controller', 'workpiece'}
 _LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
 _JOINT_KEYS = {'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', *_LIMITS}
@@ -110,6 +112,12 @@ class Robot:
         n = len(self.joint_names)
         if n == 0:
             raise ModelError(f'robot {self.name!r} has no joints')
+        for name in (self.name, *self.joint_names):
+            if _UNSPOKEN.search(name):
+                raise ModelError(
+                    f'the name {name!r} has a line end or another control character; names are lines '
+                    'of programs and tables, so write it without'
+                )
         if len(set(self.joint_names)) != n:
             raise ModelError(f'robot {self.name!r} uses a joint name twice: {self.joint_names}')
         if self.convention not in _CONVENTIONS:

@@ -96,7 +96,12 @@ def export(
         np.linalg.inv(context.controller.flange) @ robot.T_flange_tool,
         trigger,
         plan.stations,
-        (f'{robot.name}: {source}', 'made by weld_twin', 'check for collisions first'),
+        # A line end, or the sign that ends a statement of FANUC, would end the comment.
+        (
+            ' '.join(f'{robot.name}: {source}'.replace(';', ',').split()),
+            'made by weld_twin',
+            'check for collisions first',
+        ),
     )
     text = written(made, language)
     _read_again(made, text, language)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array
 from ...effects.dated import of_the_robot
@@ -24,7 +24,7 @@ from ...twin.domain import Domain
 from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
-from ..algebra.definite import inverted
+from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
@@ -36,7 +36,7 @@ from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
 from .dispersion import dispersion
 from .leftover import Foretold, leftover, told_noise
-from .sizes import Prior, Rows, Weighed, weighed, with_prior
+from .sizes import Prior, Products, Rows, weighed, with_prior
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
@@ -72,13 +72,14 @@ def allowed(
     system = Conditioning(rows, prior, models.shown, models.noise)
     fit = Fit(model, rows.residual)
     regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
-    levers = _levers(problem, model, scale)
+    levers, parts = _levers(problem, model, scale), rows.parts(regions.labels)
     spread = models.covariance
     # Of stations the discrepancy is as large as makes regions hold that others predict.
     if not problem.at_rest:
-        spread = spread * _dispersion(rows, prior, models, regions.labels)
+        drawn = [Conditioning(rows, prior, width, models.noise).rooted for width in models.drawn]
+        spread = spread * dispersion(parts, models.noise / rows.share, drawn)
     whole = models.mean, spread
-    foretold = Foretold.of(regions, rows.columns, levers, system.given, whole)
+    foretold = Foretold.of(regions, rows.columns, parts, levers, system.given, whole)
     noise, turning = told_noise(problem, floor), ~np.asarray(model.robot.prismatic)
     lost = _lost(problem, model)
     remaining = leftover(problem, foretold, turning, noise, models.rough, lost)
@@ -99,12 +100,6 @@ def allowed(
         middle=float(bool(model.found)),
     )
     return _with_usual_sigma(posterior, model, problem)
-
-
-def _dispersion(rows: Rows, prior: Prior, models: Weighed, labels: Array) -> float:
-    """Return by how much the covariance of the coordinates is too small for unseen postures."""
-    given = [Conditioning(rows, prior, width, models.noise).given for width in models.drawn]
-    return dispersion(rows.columns, rows.residual, models.noise / rows.share, given, labels)
 
 
 def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
@@ -261,30 +256,44 @@ class Conditioning:
     def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
         self._prior, self._width = prior, width
         self._sure = rows.share / noise
-        self._rows, (self._system, self._right) = rows, self._of(rows)
+        self._system, self._right = self._of(rows.products)
 
-    def _of(self, rows: Rows) -> tuple[Array, Array]:
+    def _of(self, part: Products) -> tuple[Array, Array]:
         """Return normal matrix and right-hand side of rows, coordinates in their widths."""
         width = self._width
-        return self._sure * np.outer(width, width) * rows.products, self._sure * width * rows.pull
+        system = np.outer(width, width)
+        system *= self._sure
+        system *= part.columns
+        return system, self._sure * width * part.residual
 
-    def given(self, but: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+    def _equations(self, but: Products | None) -> tuple[Array, Array]:
+        """Return a root of the information of all rows but some, and what pulls at coordinates."""
+        system, right = self._system.copy(), self._right
+        if but is not None:
+            less, pull = self._of(but)
+            system -= less
+            right = right - pull
+        right = right - system @ (self._prior.middle / self._width)
+        return root_of(with_prior(system)), right
+
+    def given(self, but: Products | None = None) -> tuple[Array, Array]:
         """
         Return mean, shape (P,), and covariance, shape (P, P), of the coordinates.
 
-        but: rows left out, shape (rows,).
+        but: rows left out.
         """
-        system, right, width = self._system, self._right, self._width
-        if but is not None:
-            own = self._rows
-            less, pull = self._of(
-                replace(own, columns=own.columns[:, but], residual=own.residual[but])
-            )
-            system, right = system - less, right - pull
-        inverse = inverted(with_prior(system.copy()))
-        right = right - system @ (self._prior.middle / width)
+        width = self._width
+        root, right = self._equations(but)
+        inverse = inverse_of(root)
         mean = self._prior.middle + width * (inverse @ right)
         return mean, inverse * np.outer(width, width)
+
+    def rooted(self, but: Products) -> tuple[Array, Array]:
+        """Return the mean and a root S of the covariance S S', shape (P, P), without some rows."""
+        root, right = self._equations(but)
+        upper = dtrtri(root, lower=1, overwrite_c=1)[0].T
+        mean = self._prior.middle + self._width * (upper @ (upper.T @ right))
+        return mean, self._width[:, None] * upper
 
 
 def left_open(problem: Problem, model: Model) -> tuple[str, ...]:

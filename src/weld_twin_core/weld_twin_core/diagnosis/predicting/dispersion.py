@@ -21,13 +21,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.definite import unit_diagonal
+from .sizes import Products
 
-Given = Callable[[NDArray[np.bool_]], tuple[Array, Array]]
-"""Mean and covariance of the coordinates given all rows but those of a mask."""
+Rooted = Callable[[Products], tuple[Array, Array]]
+"""Mean of the coordinates given all rows but those of a part, and a root S of their covariance S S'."""
 USUAL = 0.5
 """Standard deviation of the logarithm of a dispersion before the data: a judgement, models of real
 arms are seldom off by twice what they say."""
@@ -37,24 +36,18 @@ ROUNDING = 1e-9
 """Share of the largest variance below which a direction is certain."""
 
 
-def dispersion(
-    columns: Array, residual: Array, noise: float, models: Sequence[Given], regions: Array
-) -> float:
+def dispersion(parts: Sequence[Products], noise: float, models: Sequence[Rooted]) -> float:
     """
     Return the factor by which the covariance of the coordinates is too small.
 
-    columns, residual: whitened rows at the fitted model, shapes (P, rows) and (rows,).
+    parts: whitened rows of every region of posture, at the fitted model.
     noise: variance of a direction in the space of the rows.
     models: drawn ones.
-    regions: the region of posture of every row, shape (rows,).
     """
     likely = np.zeros((len(models), FACTORS.size))
-    for own, given in zip(likely, models, strict=True):
-        for region in np.unique(regions):
-            out = regions == region
-            mean, covariance = given(out)
-            error = residual[out] - mean @ columns[:, out]
-            off, variance = _along(error, covariance, columns[:, out])
+    for own, rooted in zip(likely, models, strict=True):
+        for part in parts:
+            off, variance = _along(part, *rooted(part))
             whole = FACTORS[:, None] * variance + noise
             own -= 0.5 * (off**2 / whole + np.log(whole)).sum(axis=1)
     weights = np.exp(likely - likely.max(axis=1, keepdims=True)).mean(axis=0)
@@ -62,12 +55,10 @@ def dispersion(
     return float(weights @ FACTORS / weights.sum())
 
 
-def _along(error: Array, covariance: Array, columns: Array) -> tuple[Array, Array]:
+def _along(part: Products, mean: Array, root: Array) -> tuple[Array, Array]:
     """Return errors of rows along the directions in which they are foretold, and their variances."""
-    scaled, size = unit_diagonal(covariance, 0.0)
-    values, vectors = np.linalg.eigh(scaled)
-    ways = (vectors * np.sqrt(np.maximum(values, 0.0))).T @ (size[:, None] * columns)
-    variance, turn = np.linalg.eigh(ways @ ways.T)
+    error = root.T @ (part.residual - part.columns @ mean)
+    variance, turn = np.linalg.eigh(root.T @ part.columns @ root)
     open_ = variance > ROUNDING * max(float(variance[-1]), 1e-300)
     variance = variance[open_]
-    return (turn[:, open_].T @ (ways @ error)) / np.sqrt(variance), variance
+    return (turn[:, open_].T @ error) / np.sqrt(variance), variance

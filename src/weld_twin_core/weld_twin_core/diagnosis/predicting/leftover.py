@@ -12,7 +12,7 @@ how much the arm has of all the small errors that could be told.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ from ..algebra.fit import trusted
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem
 from ..unseen.unseen_stretches import Unseen
+from .sizes import Products
 
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
@@ -69,8 +70,8 @@ CLEAR = 2.0
 """Standard errors by which more must be left there than elsewhere: a bound that is told too wide does
 less harm than one too narrow."""
 
-Given = Callable[[NDArray[np.bool_]], tuple[Array, Array]]
-"""Mean and covariance of the coordinates given all rows but those of a mask."""
+Given = Callable[[Products], tuple[Array, Array]]
+"""Mean and covariance of the coordinates given all rows but those of a part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,7 @@ class Foretold:
         cls,
         unseen: Unseen,
         columns: Array,
+        parts: Sequence[Products],
         levers: Array,
         given: Given,
         whole: tuple[Array, Array],
@@ -116,9 +118,10 @@ class Foretold:
 
         unseen: of the fitted model, with regions of posture left out in turn.
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
+        parts: the columns' products in every region.
         whole: mean and covariance of the coordinates given all rows.
         """
-        error, ways = unseen.whole, _by_others(unseen, columns, given)
+        error, ways = unseen.whole, _by_others(unseen, columns, parts, given)
         problem, scale, labels = unseen.problem, unseen.scale, unseen.labels
         seen = np.arange(6) < np.repeat(problem.rows, problem.samples)[:, None]
         place, wide = np.nonzero(seen), 3 if max(problem.rows) <= 3 else 6
@@ -158,13 +161,13 @@ class Foretold:
         return left, moments, levers.transpose(1, 2, 0)
 
 
-def _by_others(unseen: Unseen, columns: Array, given: Given) -> Array:
+def _by_others(unseen: Unseen, columns: Array, parts: Sequence[Products], given: Given) -> Array:
     """Return in which ways each region may be off what the others foretell, shape (P + 1, rows)."""
     labels = unseen.labels
     ways = np.empty((len(columns) + 1, labels.size))
-    for region in np.unique(labels):
+    for region, part in zip(np.unique(labels), parts, strict=True):
         out = labels == region
-        mean, covariance = given(out)
+        mean, covariance = given(part)
         ways[:-1, out] = _ways(covariance, columns[:, out])
         # The mean is counted from the fit to all rows, the error from the fit to the others.
         ways[-1, out] = mean @ columns[:, out] + unseen.whole[out] - unseen.residual[out]

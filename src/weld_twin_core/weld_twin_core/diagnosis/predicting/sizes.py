@@ -75,6 +75,13 @@ class Prior:
     """Families whose coordinates all have one size, shape (G,)."""
 
 
+class Products(NamedTuple):
+    """Products of the columns of some rows with each other, (P, P), and with the residual, (P,)."""
+
+    columns: Array
+    residual: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """
@@ -92,14 +99,21 @@ class Rows:
     moved: Array | None = None
 
     @cached_property
-    def products(self) -> Array:
-        """Return the products of all columns with each other, shape (P, P)."""
-        return np.asarray(self.columns @ self.columns.T)
+    def products(self) -> Products:
+        """Return the products of all rows."""
+        return Products(self.columns @ self.columns.T, self.columns @ self.residual)
 
-    @cached_property
-    def pull(self) -> Array:
-        """Return their products with what the model leaves, shape (P,)."""
-        return np.asarray(self.columns @ self.residual)
+    def parts(self, labels: Array) -> list[Products]:
+        """
+        Return the products of the rows of every label, the least first.
+
+        labels: of every row, shape (rows,).
+        """
+        out = []
+        for label in np.unique(labels):
+            columns = self.columns[:, labels == label]
+            out.append(Products(columns @ columns.T, columns @ self.residual[labels == label]))
+        return out
 
 
 class Weighed(NamedTuple):
@@ -198,8 +212,8 @@ class _Chain:
     def __post_init__(self) -> None:
         rows, prior = self.rows, self.prior
         width = prior.width
-        self.normal = rows.share * np.outer(width, width) * rows.products
-        self.right = rows.share * width * rows.pull
+        self.normal = rows.share * np.outer(width, width) * rows.products.columns
+        self.right = rows.share * width * rows.products.residual
         self.middle = prior.middle / prior.width
         self.hidden = hidden(rows, prior.group < 0)
         curves = [np.flatnonzero(prior.group == k) for k in np.flatnonzero(prior.tied)]

@@ -109,3 +109,17 @@ def test_action_table_and_card_say_the_same_of_where_the_joint_stands(off, tmp_p
     assert rows[JOINT]['meaning'] == action and float(rows[JOINT]['shown']) == pytest.approx(off)
     for brand in ('kuka', 'abb', 'fanuc', 'yaskawa', None):
         assert f'X {stands} deg' in correction(effects[0], brand, ROBOT) or brand is None
+
+
+def test_a_zero_that_is_not_named_is_not_told_to_be_set(tmp_path):
+    """It may stand against springs and lengths beside it, and does harm without them."""
+    other = ROBOT.joint_names[1]
+    effects = effects_from_list(
+        [{'effect': 'joint_offset', 'joint': at, 'offset': 2e-3} for at in (JOINT, other)], ROBOT
+    )
+    named = (('joint_offset', JOINT),)
+    model = Model(ROBOT, (np.eye(4),), found=tuple(effects), named=named)
+    write_offsets(tmp_path / 'o.csv', model, ())
+    rows = {row['joint']: row for row in csv.DictReader((tmp_path / 'o.csv').open())}
+    assert float(rows[JOINT]['offset']) == 2e-3
+    assert float(rows[other]['offset']) == 0.0 and not rows[other]['meaning']

@@ -15,6 +15,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.programs.plain_arm import tool_pose
 from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_msgs_py.robots import read_robot_yaml
 from weld_twin_nodes.cli import main
 
@@ -50,6 +51,7 @@ def test_files_hold_the_zero(answer):
     robot = read_robot_yaml(answer / 'robot.yaml')
     assert robot.theta[2] - ROBOT.theta[2] == pytest.approx(ZERO, abs=4e-5)
     assert np.abs(robot.beta - ROBOT.beta).max() == 0.0
+    assert ('joint_offset', 'joint_3') in read_model(ROBOT, answer / 'diagnosis.json').named
 
 
 def test_the_zero_is_named_with_the_other_beside_it_and_no_motion_is_asked_for(answer):

@@ -81,6 +81,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
             effects_from_list(_at_rest(model, key), robot) for key in ('known', 'found')
         )
         alone = _alone(model.get('alone'), robot)
+        named = _named(content.get('verdict'))
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
@@ -89,7 +90,14 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
     with_tool = robot.with_frames(tool=tool)
     mended = tuple(str(item.get('sentence')) for item in applied)
-    return Model(with_tool, bases, known, result, mended, mends=mends, alone=alone)
+    return Model(with_tool, bases, known, result, mended, mends=mends, alone=alone, named=named)
+
+
+def _named(verdict: Any) -> tuple[tuple[str, str | None], ...] | None:
+    """Return name and joint of what a verdict names; None where a file holds a model alone."""
+    if not isinstance(verdict, dict):
+        return None
+    return tuple((entry['effect'], entry['joint']) for entry in verdict['effects'])
 
 
 def _alone(entry: Any, robot: Robot) -> Alone | None:

@@ -153,19 +153,23 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
     Write how much further each joint really stands than its reading: rad and deg, or m and mm.
 
+    Only zeros that are named are told to be set: others that a model has beside them may stand
+    against its springs and lengths, and do harm without them.
+
     A table is read by spreadsheets; where the model holds stands in the other files.
     """
     del notes
     robot = model.robot
-    offsets = joint_offsets(robot, _lasting(model)) + _zeros(model)
+    reported = [e for e in model.found if model.named is None or (e.name, e.site) in model.named]
+    offsets = joint_offsets(robot, of_the_robot((*model.known, *reported))) + _zeros(model)
     turned, rows = model.turned, []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
-        reported = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
+        said = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
         if name in turned:
-            reported += f' {TURNED_ROUND}'
-        meaning = reported if offset else ''
+            said += f' {TURNED_ROUND}'
+        meaning = said if offset else ''
         rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1], meaning))
     remarks = ''.join(f'# {line}\n' for line in _readings(model))
     table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit', 'meaning'), rows)

@@ -505,6 +505,8 @@ class Model:
     """How it was undone, as plain values to be made again; see `soundness.mending`."""
     alone: Alone | None = None
     """What its robot file does by itself; None where that is not known."""
+    named: tuple[tuple[str, str | None], ...] | None = None
+    """Name and joint of the effects found that the verdict names; None before there is one."""
     common: tuple[Array, ...] = ()
     """Errors that all samples of an instrument share, one array for every recording, empty where
     it has none; nothing before they are fitted."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import nan
 from typing import Any
 
@@ -90,7 +91,10 @@ def answer(
         if limits is None
         else next_step(result, verdict, limits, alternative),
         actions=_mended(result, effects),
-        model=result.final.model,
+        model=replace(
+            result.final.model,
+            named=tuple((each.effect.name, each.effect.site) for each in effects),
+        ),
         evidence=evidence,
         posterior=posterior,
         **_parted(unseen, reported, shares, verdict),

@@ -13,6 +13,7 @@ from weld_twin_core.diagnosis import pipeline
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses import search
+from weld_twin_core.diagnosis.hypotheses.selection import implausible
 from weld_twin_lab.belief.mix import SEVERAL, drawn
 from weld_twin_lab.belief.trial import diagnosed, recordings_of
 
@@ -48,6 +49,21 @@ def test_several_causes_together_that_look_like_one_no_machine_has_are_found():
     named = {(site.effect, site.joint) for group in told.indistinguishable for site in group}
     true = {(cause['effect'], cause.get('joint')) for cause in case.causes}
     assert len(true) == 6 and true <= named
+
+
+def test_what_stands_in_for_several_makes_room_when_one_of_them_drives_it_beyond_its_limits():
+    wave = {'joint': 'elbow_joint', 'amplitude': 8e-4, 'order': 20, 'phase': 0.4}
+    true = (
+        effect('backlash', joint='elbow_joint', width=1.2e-3),
+        effect('transmission_ripple', **wave),
+    )
+    problem, model = tiny(true, static=False, count=400)
+    first = effect('hysteresis', joint='elbow_joint', amplitude=6e-4, travel=2.5e-3)
+    work, now = search.workspace(problem, model.with_found((first,)), (), Beliefs())
+    assert not implausible(now.model)
+    found, refused = search.forward(work, now, 8)
+    assert {e.name for e in found.model.found} == {e.name for e in true}
+    assert not refused
 
 
 @pytest.mark.parametrize(('offset', 'put_back'), [(2e-3, True), (2.0, False)])

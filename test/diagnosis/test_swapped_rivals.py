@@ -63,6 +63,23 @@ def test_what_stands_for_several_gives_way_to_them():
     assert len(slots) == 2
 
 
+def test_waves_that_came_one_by_one_give_way_to_a_zero_and_one_wave():
+    joint = 'elbow_joint'
+    zero, wave = (
+        effect('joint_offset', joint=joint, offset=-1e-3),
+        effect('transmission_ripple', joint=joint, amplitude=1.9e-3, order=3, phase=-0.75),
+    )
+    problem, model = tiny((zero, wave))
+    stand_ins = {'amplitude': [6e-4, 1e-3, 3e-4, 1.4e-3], 'order': [4, 1, 5, 3], 'phase': 0.1}
+    ripple = effect('transmission_ripple', joint=joint, **stand_ins)
+    work, now = search.workspace(problem, model.with_found((ripple,)), (), Beliefs())
+    kept, _ = search.settled(work, now, str)
+    found = {e.name: e for e in kept.model.found}
+    assert found.keys() == {'joint_offset', 'transmission_ripple'}
+    assert found['transmission_ripple'].order == 3
+    assert found['joint_offset'].number('offset') == pytest.approx(-1e-3, abs=5e-5)
+
+
 @pytest.mark.parametrize('back', [0.0, 0.4])
 def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(monkeypatch, back):
     problem, model = tiny(TRUE)

@@ -61,7 +61,7 @@ class _Search(SearchHooks):
     def with_orders(self, orders: Array) -> TransmissionRipple:
         own, pairs = self.orders(), self.effect.fit.coordinates().reshape(-1, 2)
         wanted = [pairs[own == order].sum(axis=0) for order in orders]
-        like = TransmissionRipple(self.effect.joint, np.zeros(len(wanted)), orders, 0.0)
+        like = self.kind(self.effect.joint, 0.0, orders if orders.size > 1 else orders.item(), 0.0)
         return like.from_atoms(np.array(wanted))
 
     def joined(self, other: TransmissionRipple) -> TransmissionRipple:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..algebra.still_joints import REASON, hardly_moves, moved_most, orders_told
 from ..result import Site
 from .any_motion import set_instead
-from .seed_systems import Role, SeedSystems, Unit
+from .seed_systems import Part, Role, SeedSystems, Unit, parts
 
 EXCLUDED = 'excluded by the user'
 FEW = 2
@@ -36,6 +37,15 @@ class Library:
     units: tuple[Unit, ...]
     absent: dict[str, str]
     """Why a family is not considered, by name."""
+
+    @cached_property
+    def seeds_of(self) -> dict[Part, list[int]]:
+        """Return the seeds of every part, and of every effect as a whole, counted over the units."""
+        out: dict[Part, list[int]] = {}
+        for k, seed in enumerate(seed for unit in self.units for seed in unit.seeds):
+            for part in {*parts(seed), Part(Site.of(seed))}:
+                out.setdefault(part, []).append(k)
+        return out
 
 
 def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:

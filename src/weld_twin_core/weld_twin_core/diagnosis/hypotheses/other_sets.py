@@ -6,23 +6,26 @@ Other sets of effects that explain the recordings: the search, without what it t
 An effect that enters early may stand for several, and then keeps them out: a base that moved for
 a zero and a spring. No exchange of one effect for another leads away from there. So each effect
 found is forbidden in turn, and the set is completed without it, by products of columns alone:
-these are computed once, and a set costs a small system of equations.
+these are computed once, and a set costs a small system of equations. Waves that came one by one may
+stand for a zero and one wave: each is forbidden by itself, too, and all are chosen anew.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
+from ...effects.effect import Effect
 from ..algebra.definite import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
 from ..result import Site
 from .library import Library
-from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
+from .seed_systems import SINGULAR, Choice, Part, SeedSystems, evidence, parts, ranking
 from .selection import Workspace, backward, implausible, merged, sites
 
 BEGUN = 6
@@ -40,8 +43,8 @@ ROUNDS = 4
 class Other(NamedTuple):
     """A set of effects that does without one that was found."""
 
-    instead_of: Site
-    """What it does without."""
+    instead_of: Part | None
+    """What it does without; None where waves were only chosen anew."""
     fit: Fit
     ahead: float
     """By how much evidence [nats] it is ahead of what was found; less than nothing where
@@ -85,15 +88,28 @@ class Sets:
         gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
         return evidence(self.systems.rss, gain, float(len(columns)), self.count) - cost
 
-    def beside(self, chosen: Sequence[Choice], least: float = -np.inf) -> list[Choice]:
-        """Return what units are worth beside a set, more than the least, most evidence first."""
+    def beside(
+        self, chosen: Sequence[Choice], open_to: NDArray[np.bool_], least: float = -np.inf
+    ) -> list[Choice]:
+        """
+        Return what units are worth beside a set, more than the least, most evidence first.
+
+        open_to: which of the library's seeds may be chosen, shape (S,).
+        """
         columns = _columns(chosen)
         systems = self.systems
         if columns:
             normal, pull = self._equations(columns)
             products = np.column_stack([*(self._cross[c] for c in columns), self.right])
             systems = systems.given(normal, pull, systems.rss, products)
-        return ranking(systems, self.library.units, self.count, least)
+        return ranking(systems, self.library.units, self.count, least, open_to=open_to)
+
+    def _open(self, wanted: Iterable[Part]) -> NDArray[np.bool_]:
+        """Return which of the library's seeds are of some parts, shape (S,)."""
+        out = np.zeros(sum(len(unit.seeds) for unit in self.library.units), dtype=bool)
+        for part in wanted:
+            out[self.library.seeds_of.get(part, [])] = True
+        return out
 
     def _equations(self, columns: list[int]) -> tuple[Array, Array]:
         """Return the normal equations of some columns."""
@@ -110,30 +126,33 @@ class Sets:
             rows -= self.frames @ self.frames[new].T
             self._cross.update(zip(new, rows.T.copy(), strict=True))
 
-    def of(self, wanted: Sequence[Site]) -> list[Choice]:
-        """Return some units as a set, each with the seed that serves it best beside the others."""
+    def of(self, wanted: Iterable[Part]) -> list[Choice]:
+        """Return some parts as a set, each with the seed that serves it best beside the others."""
         chosen: list[Choice] = []
         remaining = set(wanted)
-        while best := next((c for c in self.beside(chosen) if c.unit.site in remaining), None):
+        while best := next(iter(self.beside(chosen, self._open(remaining))), None):
             chosen.append(best)
-            remaining.remove(best.unit.site)
+            remaining.remove(best.part)
         return chosen
 
-    def without(self, start: list[Choice], never: Site) -> list[Choice]:
-        """Return the best set that begins with another and lacks a unit."""
+    def without(self, start: list[Choice], never: Part | None) -> list[Choice]:
+        """Return the best set that begins with another and lacks a part, if any."""
         entering = self._entering(start, never)[:BEGUN]
         self._know(_columns(entering))
         begun = [[*start, first] for first in entering]
-        more = {_names(one): one for one in (self._grown(one, never, 1) for one in begun)}
+        more = {
+            frozenset(c.part for c in one): one
+            for one in (self._grown(one, never, 1) for one in begun)
+        }
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
         return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
 
-    def _entering(self, chosen: Sequence[Choice], never: Site) -> list[Choice]:
+    def _entering(self, chosen: Sequence[Choice], never: Part | None) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
-        taken = {never, *_names(chosen)}
-        return [c for c in self.beside(chosen, self.enter_nats) if c.unit.site not in taken]
+        taken = self._open([*filter(None, [never]), *(choice.part for choice in chosen)])
+        return self.beside(chosen, ~taken, self.enter_nats)
 
-    def _grown(self, chosen: list[Choice], never: Site, most: int) -> list[Choice]:
+    def _grown(self, chosen: list[Choice], never: Part | None, most: int) -> list[Choice]:
         """Return a set with what else earns a place, one unit after the other."""
         for _ in range(most):
             entering = self._entering(chosen, never)
@@ -170,49 +189,40 @@ def reconsidered(work: Workspace, now: Fit, sets: Sets) -> tuple[Fit, list[Other
 
 
 def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
-    """Return the best set without each effect found, where it is near what was found."""
-    chosen, out = sets.of(sites(now)), []
+    """Return the best set without each part found, where it is near what was found."""
+    found = [parts(effect) for effect in now.model.found]
+    chosen, out = sets.of(part for each in found for part in each), []
     least = sets.worth(chosen) - work.beliefs.rival_nats
-    for place in sites(now):
-        other = sets.without([c for c in chosen if c.unit.site != place], place)
+    several = [each for each in found if len(each) > 1]
+    ways: list[tuple[list[Part], Part | None]] = [
+        ([Part(place)], Part(place)) for place in sites(now)
+    ]
+    ways += [([wave], wave) for each in several for wave in each]
+    ways += [(each, None) for each in several]
+    for left, never in ways:
+        kept = [c for c in chosen if not {c.part, Part(c.unit.site)} & set(left)]
+        other = sets.without(kept, never)
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
             if own.rss < work.hopeless(now) and not implausible(own.model):
-                out.append(Other(place, own, ahead(work, own, now)))
+                out.append(Other(never, own, work.ahead(own, now)))
     return out
 
 
 def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     """Return the fit of a set; what was found before starts at its values."""
-    known = {Site.of(effect): effect for effect in now.model.found}
-    result = tuple(known[place] for place in _names(chosen) if place in known)
-    for choice in chosen:
-        if choice.unit.site not in known:
-            result = merged(result, choice.effect())
+    found = {Site.of(effect): effect for effect in now.model.found}
+    wanted = sorted({c.part: c for c in chosen}.items(), key=str)
+    result = tuple[Effect, ...]()
+    for (site, order), choice in wanted:
+        own = found.get(site)
+        if own is None or (order is not None and order not in own.search.orders()):
+            own = choice.effect()
+        elif order is not None:
+            own = own.search.with_orders(np.array([order]))
+        result = merged(result, own)
     return work.fitted(now.model.with_found(result), 8, work.hopeless(now))
-
-
-def ahead(work: Workspace, own: Fit, now: Fit) -> float:
-    """
-    Return by how much evidence [nats] one set is ahead of another.
-
-    An effect more costs what it costs to enter: that two errors happen to be one is seldom.
-
-    own, now: the one and the other, on the workspace's problem and scale.
-    """
-    trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
-
-    def cost(result: Fit) -> float:
-        return sum(trials.get(place, 0.0) + work.beliefs.enter_nats for place in sites(result))
-
-    more = float(own.coordinates.size - now.coordinates.size)
-    count = work.independent((now, own))
-    return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
 
 
 def _columns(chosen: Sequence[Choice]) -> list[int]:
     return [int(column) for choice in chosen for column in choice.columns]
-
-
-def _names(chosen: Sequence[Choice]) -> tuple[Site, ...]:
-    return tuple(sorted((c.unit.site for c in chosen), key=str))

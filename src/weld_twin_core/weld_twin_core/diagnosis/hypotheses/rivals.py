@@ -25,8 +25,8 @@ from ...effects.registry import REGISTRY
 from ..algebra.fit import Fit
 from ..result import Site
 from .any_motion import constant, of_no_size, same_error
-from .other_sets import Other, ahead
-from .seed_systems import Choice, Role, evidence
+from .other_sets import Other
+from .seed_systems import Choice, Part, Role, evidence
 from .selection import Workspace, backward, implausible, sites
 
 SHORTLIST, BESIDE = 7, 3
@@ -100,7 +100,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
     for choice, other in tried:
         out.append(Rival(choice.unit.site, nats(other, choice), other, role=choice.unit.role))
     for other_set in others:
-        if other_set.instead_of == place:
+        if other_set.instead_of == Part(place):
             # What it has that was not found, what entered first before the others.
             known = {*sites(now), *(one.site for one in out)}
             first = next((site for site in sites(other_set.fit) if site not in known), None)
@@ -172,7 +172,7 @@ def _lead(work: Workspace, now: Fit, other: Rival) -> Array | None:
     kept = sites(own)
     if other.site not in kept:
         return None
-    nats = ahead(work, own, now)
+    nats = work.ahead(own, now)
     if nats <= work.beliefs.enter_nats:
         return None
     return np.array([nats * (site not in kept) for site in sites(now)])

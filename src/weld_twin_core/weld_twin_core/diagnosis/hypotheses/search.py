@@ -17,7 +17,15 @@ from ..result import Site
 from .library import Library, build
 from .other_sets import AHEAD, Sets, reconsidered
 from .rivals import Rival, rivals, with_leads
-from .selection import Workspace, backward, forward, implausible, possible_part, sites
+from .selection import (
+    Workspace,
+    backward,
+    forward,
+    implausible,
+    possible,
+    possible_part,
+    sites,
+)
 
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
@@ -152,18 +160,6 @@ def _chosen(
         del work, now, grown  # or two libraries would be held at once
         work, now = workspace(few, model, exclude, beliefs)
     return work, now, refused, crowded
-
-
-def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
-    """
-    Return the fit without what no machine has; that is added to those refused.
-
-    refused: those refused so far; more are added to it.
-    """
-    while absurd := implausible(now.model):
-        refused += absurd
-        now = work.fitted(possible_part(now.model))
-    return now
 
 
 def settled(

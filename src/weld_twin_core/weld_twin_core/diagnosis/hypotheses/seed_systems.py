@@ -39,6 +39,20 @@ class Role(Enum):
     TAKEN_OUT = 'taken out'
 
 
+class Part(NamedTuple):
+    """What a set has or lacks: an effect, or one wave of an effect that has several."""
+
+    site: Site
+    order: float | None = None
+    """Of the wave, in cycles per turn; None of the whole effect."""
+
+
+def parts(effect: Effect) -> list[Part]:
+    """Return what an effect is a set of: its waves, where it is a sum of waves, or itself."""
+    site = Site.of(effect)
+    return [Part(site, order) for order in effect.search.orders().tolist()] or [Part(site)]
+
+
 @dataclass(frozen=True, eq=False)
 class Unit:
     """One family on one joint: the smallest thing a verdict can name."""
@@ -218,6 +232,11 @@ class Choice:
     """Of the seed's columns, those that earn their place."""
 
     @property
+    def part(self) -> Part:
+        """Return what it puts into a set."""
+        return parts(self.unit.seeds[self.seed])[0]
+
+    @property
     def columns(self) -> Index:
         """Return the numbers of the columns that earn their place."""
         return np.asarray(self.alike.columns[self.row][self.chosen])
@@ -238,6 +257,7 @@ def ranking(
     effective: float,
     least: float = -np.inf,
     roles: Collection[Role] = (Role.FOUND,),
+    open_to: NDArray[np.bool_] | None = None,
 ) -> list[Choice]:
     """
     Return every unit's best choice, most evidence first.
@@ -247,6 +267,7 @@ def ranking(
     effective: number of independent rows.
     least: evidence [nats] that a choice must exceed.
     roles: which units are asked.
+    open_to: which seeds may be chosen, counted over the units in order, shape (S,); all by default.
     """
     each = [grown(alike, systems.rss, effective, least) for alike in systems.alike]
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
@@ -255,6 +276,8 @@ def ranking(
     for k, (alike, (_, own)) in enumerate(zip(systems.alike, each, strict=True)):
         log_bayes_factor[alike.seeds], group[alike.seeds] = own, k
         row[alike.seeds] = np.arange(alike.seeds.size)
+    if open_to is not None:
+        log_bayes_factor[~open_to] = -np.inf
     worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
     worth = worth - np.log([unit.trials for unit in units])
     result = []

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library
-from .seed_systems import Choice, Role, SeedSystems, evidence, ranking
+from .seed_systems import Choice, Role, SeedSystems, evidence, parts, ranking
 from .starts import started
 
 SHORTLIST = 4
@@ -111,6 +112,25 @@ class Workspace:
         effect = started(self.problem, model, self.scale, effect)
         return self.fitted(model.with_found(merged(model.found, effect)), 5)
 
+    def ahead(self, own: Fit, now: Fit) -> float:
+        """
+        Return by how much evidence [nats] one set is ahead of another.
+
+        An effect or a wave more costs what it costs to enter: that two errors happen to be one
+        is seldom.
+
+        own, now: the one and the other.
+        """
+        trials = {unit.site: float(np.log(unit.trials)) for unit in self.library.units}
+
+        def cost(result: Fit) -> float:
+            each = (part for effect in result.model.found for part in parts(effect))
+            return sum(trials.get(part.site, 0.0) + self.beliefs.enter_nats for part in each)
+
+        more = float(own.coordinates.size - now.coordinates.size)
+        count = self.independent((now, own))
+        return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
+
     def hopeless(self, now: Fit) -> float:
         """Return the sum of squares from which on nothing can take the place of what was found."""
         with np.errstate(
@@ -131,6 +151,20 @@ class Workspace:
         return ranking(self.beside(now), self.library.units, count, least, tuple(roles))
 
 
+class _Step(NamedTuple):
+    """What a step of a selection comes to."""
+
+    fit: Fit
+    """With the best choice that a machine can have; as it was where there is none."""
+    entered: str | None
+    """What entered, in words."""
+    impossible: list[Effect]
+    """Better ones that no machine has."""
+    passed: bool
+    """Whether one of these was passed over that is of no machine's size: what only has no such shape
+    is another family's, or that of several causes together."""
+
+
 def forward(
     work: Workspace,
     now: Fit,
@@ -142,11 +176,29 @@ def forward(
 
     Several causes together may look like one that no machine has, and so may one that the library
     lacks. So the search passes it over; where it, or another such, would still explain what is left in
-    the end, all that entered after it stood in for a part of that, and goes.
+    the end, all that entered after it stood in for a part of that, and goes. What looks like a machine's
+    may stand in for several, too, until what enters next drives it beyond that: then it makes
+    room, if the set that this leads to is worth more.
 
     now: with what the model has already.
     most: stop after this many units.
     tick: told what was found, for progress.
+    """
+    gone = set[Site]()
+    made_room = _selected(work, now, most, tick, gone)
+    if not gone:
+        return made_room
+    kept = _selected(work, now, most, tick, None)
+    return max(kept, made_room, key=lambda one: work.ahead(one[0], kept[0]))
+
+
+def _selected(
+    work: Workspace, now: Fit, most: int, tick: Callable[[str], None], gone: set[Site] | None
+) -> tuple[Fit, list[Effect]]:
+    """
+    Return what `forward` does.
+
+    gone: what made room is added, and does not come back; None where nothing makes room.
     """
     doubted: tuple[Fit, list[Effect]] | None = None
     for _ in range(most):
@@ -158,25 +210,25 @@ def forward(
             choice
             for choice in work.ranked(now, rows, work.beliefs.enter_nats)
             if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
+            if choice.unit.site not in (gone or ())
         ]
-        best, entered, impossible, passed = _with_best(work, now, ranked)
-        if passed:
-            doubted = doubted or (now, impossible)
-        if entered is None:
-            return (passed and doubted) or (now, impossible)
-        now = best
-        tick(entered)
+        step = _with_best(work, now, ranked, gone is not None)
+        if step.passed:
+            doubted = doubted or (now, step.impossible)
+        if step.entered is None:
+            return (step.passed and doubted) or (now, step.impossible)
+        if gone is not None:
+            gone |= set(taken) - set(sites(step.fit))
+        now = step.fit
+        tick(step.entered)
     return now, []
 
 
-def _with_best(
-    work: Workspace, now: Fit, ranked: list[Choice]
-) -> tuple[Fit, str | None, list[Effect], bool]:
+def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool) -> _Step:
     """
-    Return the fit with the best choice that a machine can have, its name, and better ones that none has.
+    Return the step that the best choice is.
 
-    The last says whether one of these was passed over that is of no machine's size. What only has no
-    such shape is another family's, or that of several causes together.
+    makes_room: whether what was found before goes where a choice drives it beyond its limits.
     """
     beliefs, impossible, passed = work.beliefs, list[Effect](), False
     while ranked:
@@ -190,17 +242,20 @@ def _with_best(
             nats = evidence(now.rss, now.rss - one.rss, freedom, count)
             worth.append((nats - float(np.log(unit.trials)), one, unit))
         worth = [item for item in worth if item[0] > beliefs.enter_nats]
-        possible = [item for item in worth if not implausible(item[1].model)]
-        absurd = [effect for _, one, _ in worth for effect in implausible(one.model)]
-        impossible += absurd
-        if possible:
-            nats, best, unit = max(possible, key=lambda item: item[0])
-            return best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed
+        absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
+        impossible += [effect for _, effect in absurd]
+        # What drives others beyond their limits and stays within its own is no machine's fault.
+        barred = {site for site, e in absurd if not makes_room or Site.of(e) == site}
+        remaining = [item for item in worth if item[2].site not in barred]
+        if remaining:
+            nats, best, unit = max(remaining, key=lambda item: item[0])
+            best = possible(work, best, [])
+            return _Step(best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed)
         if not absurd:
             break
-        passed |= not all(_misshapen(now.model.robot, effect) for effect in absurd)
+        passed |= not all(_misshapen(now.model.robot, effect) for _, effect in absurd)
         ranked = [choice for choice in ranked if choice not in close]
-    return now, None, impossible, passed
+    return _Step(now, None, impossible, passed)
 
 
 def _misshapen(robot: Robot, effect: Effect) -> bool:
@@ -223,6 +278,18 @@ def implausible(model: Model) -> list[Effect]:
 def possible_part(model: Model) -> Model:
     """Return the model without the effects that are beyond what a machine can have."""
     return model.with_found(tuple(e for e in model.found if not beyond(model.robot, e)))
+
+
+def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
+    """
+    Return the fit without what no machine has; that is added to those refused.
+
+    refused: those refused so far; more are added to it.
+    """
+    while absurd := implausible(now.model):
+        refused += absurd
+        now = work.fitted(possible_part(now.model))
+    return now
 
 
 def merged(result: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:

@@ -52,6 +52,20 @@ def test_a_diagnosis_is_added_once_and_shown(diagnosed, url, capsys):
     assert capsys.readouterr().out == 'line 3\n'
 
 
+def test_a_date_that_would_be_lost_is_told(diagnosed, url, capsys):
+    words = ['history', 'add', str(diagnosed), '--cell', 'line 3', '--db', url, '--at']
+    assert main([*words, '2026-03-02']) == 0
+    assert main([*words, '2026-04-02']) == 2
+    assert '2026-03-02' in capsys.readouterr().err
+    assert (
+        main(['history', 'add', str(diagnosed), '--cell', 'b', '--db', url, '--at', '2926-03-02'])
+        == 0
+    )
+    assert '2926-03-02 is still to come' in capsys.readouterr().out
+    assert main([*words[:-3], '--db', url, '--at', '1026-03-02']) == 2
+    assert 'is no date of a recording' in capsys.readouterr().err
+
+
 def test_what_is_read_is_what_was_written(diagnosed, url):
     entry = entry_of(diagnosed, MONDAY)
     database = Database(url)

@@ -14,7 +14,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from datetime import timezone
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -117,13 +117,14 @@ class Database:
         """
         Add a diagnosis within a transaction; return its number, None if it was there already.
 
-        Raises Refused: as of `add`; nothing is written then, if the caller lets it through.
+        Raises Refused: as of `add`, and where the recording is there with another date; nothing is
+        written then, if the caller lets it through.
         """
         sql, verdicts = self.sql, self.table('verdicts')
         number = self._number(connection, cell, entry)
         mine = verdicts.c.cell_id == number
-        query = sql.select(verdicts.c.id).where(mine, verdicts.c.recording == entry.recording)
-        if connection.execute(query).first() is not None:
+        query = sql.select(verdicts.c.at).where(mine, verdicts.c.recording == entry.recording)
+        if there_already(connection.execute(query).first(), entry.at, cell):
             return None
         query = sql.select(verdicts.c.id).where(mine, verdicts.c.at == stored(entry.at))
         if connection.execute(query).first() is not None:
@@ -249,6 +250,20 @@ class Database:
 def _key(made: Any) -> int:
     assert made.inserted_primary_key is not None
     return int(made.inserted_primary_key[0])
+
+
+def there_already(row: Any, at: datetime, cell: str) -> bool:
+    """
+    Tell whether a recording is in a cell, by the row that was found of it.
+
+    Raises Refused: it is, with another date, which nobody would notice.
+    """
+    if row is not None and row.at != stored(at):
+        raise Refused(
+            f'cell {cell!r} has this recording already, of {row.at.isoformat()}, and keeps that date; '
+            'where it is wrong, begin a history anew (--db) with the right dates'
+        )
+    return row is not None
 
 
 def _same_robot(cell: str, row: Row[Any], entry: Entry) -> None:

@@ -77,9 +77,14 @@ def instant(text: str) -> datetime:
     try:
         # Python 3.10 does not read the Z that others write for UTC.
         at = datetime.fromisoformat(f'{text[:-1]}+00:00' if text[-1:] in 'Zz' else text)
-        return (at if at.tzinfo else at.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+        at = (at if at.tzinfo else at.replace(tzinfo=timezone.utc)).astimezone(timezone.utc)
+        if at.year < FIRST_YEAR:
+            raise ValueError
+        return at
     except (ValueError, OverflowError):
-        raise DataError(f"'{text}' is no date; write 2026-03-31 or 2026-03-31T14:05") from None
+        raise DataError(
+            f"'{text}' is no date of a recording; write 2026-03-31 or 2026-03-31T14:05"
+        ) from None
 
 
 def entry_of(path: Path | str, at: datetime | None = None) -> Entry:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
-from .database import Database
+from .database import Database, there_already
 from .entry import date_of_stamp
 from .schema import stored
 
@@ -74,10 +74,10 @@ def put_verified(
         )
     if own.kinematics != result.content.get('kinematics'):
         raise DataError(f'cell {cell!r} has the robot {own.robot!r}, and this is of another')
-    query = sql.select(rows.c.id).where(
+    query = sql.select(rows.c.at).where(
         rows.c.cell_id == own.id, rows.c.recording == result.recording
     )
-    if connection.execute(query).first() is not None:
+    if there_already(connection.execute(query).first(), result.at, cell):
         return None
     values = {
         'at': stored(result.at),

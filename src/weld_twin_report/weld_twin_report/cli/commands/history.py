@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from contextlib import closing
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,6 +63,8 @@ def add(given: Given) -> int:
     for path, entry, number in zip(given.diagnosis, entries, made, strict=True):
         said = 'was there already' if number is None else 'added'
         print(f'{given.cell}: {path}, {entry.at.date()}, {entry.status}: {said}')
+        if entry.at > datetime.now(timezone.utc) + timedelta(days=1):
+            print(f'note: {entry.at.date()} is still to come by the clock of this computer')
     return 0
 
 

@@ -217,6 +217,45 @@ def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, 
     assert any(move.kind == 'unknown' and reason in move.why for move in moves)
 
 
+KRL_TOOL = '$TOOL = {{X 0,Y 0,Z {},A 0,B 0,C 0}}\n'
+KRL_CALLED = 'DEF sub()\n$VEL.CP = 0.1\nLIN {X 900,Y 0,Z 800,A 0,B 90,C 0}\nEND\n'
+UR_CALLED = 'def sub():\n  movel(p[0.3,0.2,0.1,0,3.1,0])\nend\n'
+UR_TOOL = 'set_tcp(p[0,0,{},0,0,0])\n'
+
+
+@pytest.mark.parametrize(
+    ('language', 'text', 'length'),
+    [
+        ('krl', 'DEF a()\n' + KRL_TOOL.format(250) + 'sub()\nEND\n' + KRL_CALLED, 0.25),
+        (
+            'krl',
+            'DEF a()\n'
+            + KRL_TOOL.format(250)
+            + 'sub()\n'
+            + KRL_TOOL.format(90)
+            + 'END\n'
+            + KRL_CALLED,
+            None,
+        ),
+        ('urscript', f'def a():\n{UR_CALLED}{UR_TOOL.format(0.25)}sub()\nend\n', 0.25),
+        (
+            'urscript',
+            f'def a():\n{UR_CALLED}{UR_TOOL.format(0.25)}sub()\n{UR_TOOL.format(0.1)}end\n',
+            None,
+        ),
+    ],
+)
+def test_a_routine_has_the_tool_of_its_program_where_that_is_one(language, text, length):
+    robot = PROGRAMS[language][0]
+    own = context(robot, language).controller
+    ((move,),) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
+    if length is None:
+        assert move.kind == 'unknown' and 'other routines' in move.why
+    else:
+        away = np.linalg.norm(move.tool[:3, 3] - own.flange[:3, 3])
+        np.testing.assert_allclose(away, length, atol=1e-12)
+
+
 def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     source = (MADE / 'bracket.mod').read_text().replace('[TRUE, [[0,0,250]', '[FALSE, [[0,0,250]')
     robot = wt.load('abb_irb1600')

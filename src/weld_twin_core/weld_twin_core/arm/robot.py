@@ -110,16 +110,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
-        if n == 0:
-            raise ModelError(f'robot {self.name!r} has no joints')
-        for name in (self.name, *self.joint_names):
-            if _UNSPOKEN.search(name):
-                raise ModelError(
-                    f'the name {name!r} has a line end or another control character; names are lines '
-                    'of programs and tables, so write it without'
-                )
-        if len(set(self.joint_names)) != n:
-            raise ModelError(f'robot {self.name!r} uses a joint name twice: {self.joint_names}')
+        self._refuse_names()
         if self.convention not in _CONVENTIONS:
             raise ModelError(
                 f'convention of robot {self.name!r} must be one of {", ".join(_CONVENTIONS)}, '
@@ -153,6 +144,18 @@ class Robot:
             raise ModelError(f'joint {self.joint_names[k]!r}: lower limit is not below upper')
         if self.mass is not None and (self.mass < 0.0).any():
             raise ModelError(f'robot {self.name!r} has a link of negative mass')
+
+    def _refuse_names(self) -> None:
+        if not self.joint_names:
+            raise ModelError(f'robot {self.name!r} has no joints')
+        for name in (self.name, *self.joint_names):
+            if _UNSPOKEN.search(name):
+                raise ModelError(
+                    f'the name {name!r} has a line end or another control character; names are lines '
+                    'of programs and tables, so write it without'
+                )
+        if len(set(self.joint_names)) < len(self.joint_names):
+            raise ModelError(f'robot {self.name!r} uses a joint name twice: {self.joint_names}')
 
     def _set(self, key: str, value: Any) -> None:
         object.__setattr__(self, key, value)

@@ -58,6 +58,11 @@ _ASSIGNED = re.compile(
 """What may be a frame, or hold the number of one; and what part of it."""
 _AFTER = re.compile(r'(?:[ \t]*C_\w+)*[ \t]*\Z', re.I)
 """What may stand behind a target."""
+OTHER_TOOL, OTHER_BASE = (
+    Frame(what, why=f'{what} is set in other routines, and not to one value')
+    for what in ('$TOOL', '$BASE')
+)
+"""Frames of a routine that has not set its own."""
 STILL = Frame(
     '', why='the tool stands still there and the robot carries the workpiece ($IPO_MODE is #TCP)'
 )
@@ -107,6 +112,8 @@ class KrlReader(Reader):
         self.suits: dict[int, Suits] = {}
         self.state = _State()
         self.kinematic = ''
+        self.tools: list[Frame] = []
+        self.bases: list[Frame] = []
 
     def read(self) -> Program:
         self.again = {name.lower(): where for name, where in self.set_again(_ASSIGNED).items()}
@@ -121,9 +128,11 @@ class KrlReader(Reader):
                 _SET: self._set,
                 _BAS: self._bas,
                 _WAIT: lambda match: self.dwell(match.span(1)),
-                _ROUTINE: self.new_piece,
+                _ROUTINE: self._routine,
             }
         )
+        self.settle(OTHER_TOOL, self.tools, tool=True)
+        self.settle(OTHER_BASE, self.bases, tool=False)
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
         return self.program
 
@@ -204,6 +213,20 @@ class KrlReader(Reader):
 
     # Statements ------------------------------------------------------------------------------
 
+    def _routine(self, result: re.Match[str]) -> None:
+        self.new_piece(result)
+        if self.routines > 1:
+            self.state.tool, self.state.base = OTHER_TOOL, OTHER_BASE
+
+    def _use(self, tool: Frame | None, base: Frame | None) -> None:
+        """Set tool and base for the moves that follow; None leaves one as it is."""
+        if tool is not None:
+            self.state.tool = tool
+            self.tools.append(tool)
+        if base is not None:
+            self.state.base = base
+            self.bases.append(base)
+
     def _other(self, result: re.Match[str]) -> None:
         self.unknown('linear', result, f'{result[1].upper()} is not understood')
 
@@ -228,8 +251,7 @@ class KrlReader(Reader):
                 )
             elif where := self._again(value):
                 named = Frame(named.name, why=f'the numbers of {value} are set anew at {where}')
-            self.state.base = named if what[:5] == '$BASE' else self.state.base
-            self.state.tool = named if what[:5] == '$TOOL' else self.state.tool
+            self._use(*((None, named) if what[:5] == '$BASE' else (named, None)))
         elif what == '$IPO_MODE':
             self.state.still = value.upper() != '#BASE'
         elif what == '$VEL.CP':
@@ -237,7 +259,7 @@ class KrlReader(Reader):
         elif what.startswith('$VEL_AXIS'):
             self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
         elif what == 'FDAT_ACT':
-            self.state.tool, self.state.base = self._frames_of(value)
+            self._use(*self._frames_of(value))
             self.state.still = False
         elif what == 'LDAT_ACT' and value.lower() in self.data:
             speed = self.data[value.lower()].numbers.get('VEL')
@@ -247,11 +269,10 @@ class KrlReader(Reader):
         what = result[1].upper()
         start, end = stripped(self.text, *result.span(2))
         if what == 'EX_BASE':
-            self.state.base = Frame(self.text[start:end], None, None)
+            self._use(None, Frame(self.text[start:end], None, None))
         elif what in ('TOOL', 'BASE'):
             frame = self._numbered(what, self.text[start:end])
-            self.state.tool = frame if what == 'TOOL' else self.state.tool
-            self.state.base = frame if what == 'BASE' else self.state.base
+            self._use(*((frame, None) if what == 'TOOL' else (None, frame)))
         elif what == 'VEL_CP':
             self.state.speed = self._speed(start, end, self.state.speed)
         elif what == 'VEL_PTP':

@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from weld_twin_core.errors import DataError
@@ -37,6 +38,7 @@ class Reader(ABC):
         self.text = self.texts[0]
         self.program = Program('', self.sources)
         self.again: dict[str, str] = {}
+        self.routines = 0
 
     @abstractmethod
     def read(self) -> Program:
@@ -115,7 +117,27 @@ class Reader(ABC):
     def new_piece(self, match: re.Match[str]) -> None:
         """Begin another routine."""
         del match
+        self.routines += 1
         self.program.new_piece()
+
+    def settle(self, inherited: Frame, told: Sequence[Frame], *, tool: bool) -> None:
+        """
+        Give moves that stand before any frame of their routine the one that the program sets.
+
+        Where it sets several, nobody knows which holds when the routine is called.
+
+        inherited: what stands in these moves. told: what the program sets.
+        """
+        values = {(f.name, f.why, None if f.value is None else f.value.tobytes()) for f in told}
+        if len(values) > 1:
+            return
+        only = told[0] if told else Frame('')
+        for piece in self.program.pieces:
+            for k, step in enumerate(piece):
+                if tool and step.tool is inherited:
+                    piece[k] = replace(step, tool=only)
+                elif not tool and step.base is inherited:
+                    piece[k] = replace(step, base=only)
 
     def unknown(self, kind: Kind, match: re.Match[str], why: str) -> None:
         """Add a move that is not understood."""

@@ -44,6 +44,8 @@ OTHER_MOTION = (
     r'track_conveyor_\w+|frame_tracking_\w+|screw_driving'
 )
 """Functions that move the arm, or its frames, in another way."""
+OTHER_TOOL = Frame('set_tcp', why='set_tcp stands in other routines, and not with one value')
+"""The tool of a routine that has not set its own."""
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(?:def|thread)\s)'
 )
@@ -64,6 +66,7 @@ class UrscriptReader(Reader):
         self.names: dict[str, int] = {}
         self.used: set[int] = set()
         self.tool = Frame('')
+        self.tools: list[Frame] = []
 
     def read(self) -> Program:
         self._declare()
@@ -71,7 +74,9 @@ class UrscriptReader(Reader):
             if result[5]:
                 self._statement(result)
             else:
-                self.program.new_piece()
+                self.new_piece(result)
+                self.tool = OTHER_TOOL if self.routines > 1 else self.tool
+        self.settle(OTHER_TOOL, self.tools, tool=True)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])
         for name, where in self.again.items():
@@ -105,6 +110,7 @@ class UrscriptReader(Reader):
             self.program.unknown('linear', where, f'{result[2]} moves the arm in its own way')
         elif result[3]:
             self.tool = self._tool(opening + 1, end)
+            self.tools.append(self.tool)
         else:
             self.dwell((opening + 1, end))
 

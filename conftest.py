@@ -129,6 +129,27 @@ def pytest_xdist_make_scheduler(config, log):
     return ByFile(config, log)
 
 
+FEWER, FORGOTTEN = 24, 6
+"""Models that a diagnosis draws in tests, and those until the chain has forgotten its start: a quarter
+of what users get, so that what is named may not hang on how many are drawn."""
+DRAWN = 'drawn'
+"""Mark of files that are about what is drawn, or run what users run from end to end."""
+
+
+@pytest.fixture(scope='module', autouse=True)
+def fewer_models(request):
+    """Let diagnoses draw fewer models in files without the mark `DRAWN`: a fifth of their time."""
+    if request.node.get_closest_marker(DRAWN) is not None:
+        yield
+        return
+    from weld_twin_core.diagnosis.predicting import sizes
+
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(sizes, 'SWEEPS', FEWER)
+        changed.setattr(sizes, 'LEARNING', FORGOTTEN)
+        yield
+
+
 @pytest.fixture(scope='session')
 def once(tmp_path_factory):
     """Return a function that makes a folder, by its name, once for all processes of a test run."""

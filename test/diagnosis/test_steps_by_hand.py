@@ -24,6 +24,8 @@ from weld_twin_core.diagnosis.soundness.suspicions import turned_bases
 from weld_twin_core.diagnosis.unseen.groups import _curved, smooth_field
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
+pytestmark = pytest.mark.drawn
+
 
 def test_a_recording_of_one_station_is_a_block_of_its_own():
     problem, _ = tiny(count=60, turned=False)

@@ -12,6 +12,8 @@ import pytest
 from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, hidden, weighed
 
+pytestmark = pytest.mark.drawn
+
 SMALL = 40
 """Coordinates of one family."""
 NO = np.array([False])

@@ -26,6 +26,8 @@ from weld_twin_lab.plant.plant import run
 from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
+pytestmark = pytest.mark.drawn
+
 NOISE, TOLERANCE, STATIONS = 3e-5, 2e-4, 16
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Make the helper modules of these folders, and the small cells of the core, importable."""
+"""Make the helper modules of these folders, the small cells of the core, and messages importable."""
 
 import sys
 from pathlib import Path
@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from weld_twin_core.arm import catalog
+from weld_twin_core.errors import TwinError
+from weld_twin_lab.campaigns.building.message_packages import messages_importable
 
 HERE = Path(__file__).parent
 FOLDERS = ('diagnosis', 'house', 'serve', 'soundness')
@@ -19,3 +21,13 @@ sys.path[:0] = [str(CORE), str(CORE / 'soundness')]
 @pytest.fixture
 def ur5():
     return catalog.load('ur5')
+
+
+@pytest.fixture(scope='module')
+def packages():
+    """Let packages of messages that have no wheels be imported, from where they were built."""
+    try:
+        with messages_importable():
+            yield
+    except TwinError as error:
+        pytest.skip(str(error))

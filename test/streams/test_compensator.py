@@ -29,14 +29,12 @@ from std_msgs.msg import String
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import TwinError
 from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.recording import JointMotion
 from weld_twin_core.twin.directions import Directions
 from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict
-from weld_twin_lab.campaigns.building.message_packages import messages_importable
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (
     AUDIT,
@@ -165,16 +163,7 @@ class Planner:
 
 
 @pytest.fixture(scope='module')
-def messages():
-    try:
-        with messages_importable():
-            yield
-    except TwinError as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope='module')
-def shared(tmp_path_factory, messages):
+def shared(tmp_path_factory, packages):
     """One compensator that applies what it corrects, for all tests of goals."""
     folder = tmp_path_factory.mktemp('goals')
     write_model(folder / 'diagnosis.json')
@@ -419,7 +408,7 @@ def test_a_goal_that_is_worked_out_meanwhile_is_not_sent_by_what_was_known_befor
         assert len(planner.controller.goals) == count
 
 
-def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp_path, messages):
+def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp_path, packages):
     model, audit = tmp_path / 'diagnosis.json', tmp_path / 'audit'
     write_model(model)
     os.mkfifo(audit)  # nobody reads it, so that whoever opens it waits for ever
@@ -538,7 +527,7 @@ def test_a_controller_that_dies_ends_its_goal(planner):
 
 
 @pytest.fixture
-def shadow(tmp_path, messages):
+def shadow(tmp_path, packages):
     write_model(tmp_path / 'diagnosis.json')
     with Cell(tmp_path / 'cell') as cell:
         planner = Planner(

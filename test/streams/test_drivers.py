@@ -28,8 +28,6 @@ from sensor_msgs.msg import JointState
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import TwinError
-from weld_twin_lab.campaigns.building.message_packages import messages_importable
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.harness import Cell
@@ -330,15 +328,6 @@ INSTRUMENTS = {
     ),
     'points in bursts': ('a tracker that hands on 20 points at once', point, '/points', {}),
 }
-
-
-@pytest.fixture
-def packages():
-    try:
-        with messages_importable():
-            yield
-    except TwinError as error:
-        pytest.skip(str(error))
 
 
 @pytest.mark.parametrize('which', INSTRUMENTS)

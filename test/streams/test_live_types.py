@@ -25,8 +25,6 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.errors import TwinError
-from weld_twin_lab.campaigns.building.message_packages import messages_importable
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
@@ -35,7 +33,7 @@ from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
-pytestmark = pytest.mark.cells
+pytestmark = [pytest.mark.cells, pytest.mark.usefixtures('packages')]
 
 ROBOT = load('ur5')
 NAMES = ROBOT.joint_names
@@ -46,15 +44,6 @@ S = 1_000_000_000
 EXACT = 1e-9
 BEAT = 0.02
 """Seconds between two measurements."""
-
-
-@pytest.fixture(scope='session', autouse=True)
-def packages():
-    try:
-        with messages_importable():
-            yield
-    except TwinError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

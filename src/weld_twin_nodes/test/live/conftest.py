@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A robot, a short seam and a cell of live nodes."""
+"""A robot and a short seam."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.motion.planned_motion import Plan
-from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
 
@@ -24,9 +23,3 @@ def robot() -> Robot:
 def plan(robot: Robot) -> Plan:
     """Some two hundred samples with reversals in them."""
     return plan_motion(robot, 'line', 'aggressive', 50.0)
-
-
-@pytest.fixture
-def cell(tmp_path):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell

@@ -16,7 +16,6 @@ from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_COVARIANCE, TWIN_POSE
-from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
@@ -55,12 +54,6 @@ def model(robot, tmp_path):
     path = tmp_path / 'diagnosis.json'
     path.write_text(json.dumps(content))
     return path
-
-
-@pytest.fixture
-def cell(tmp_path):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell
 
 
 def stand_at(cell, robot, tap, q, start):

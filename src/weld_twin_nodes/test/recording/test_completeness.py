@@ -26,7 +26,6 @@ from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, message_class
 from weld_twin_msgs_py.robots import write_urdf
-from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
 
@@ -50,12 +49,6 @@ class Speaker(CellNode):
             q = np.full(ROBOT.n, self.number * 1e-3)
             self._joints.publish(self.messages.joint_state(stamp, ROBOT.joint_names, q))
             self.number += 1
-
-
-@pytest.fixture
-def cell(tmp_path):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell
 
 
 def recorder(cell, tmp_path, **parameters):

@@ -8,6 +8,7 @@ import signal
 import time
 
 import pytest
+from recorder_words import numbers
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
@@ -16,21 +17,13 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
-from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
 
 pytestmark = pytest.mark.cells
 
 ROBOT = load('ur5')
 S = 1_000_000_000
-
-
-@pytest.fixture
-def cell(tmp_path):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell
 
 
 class Managed:
@@ -72,11 +65,6 @@ def send(cell, publisher, numbers):
     for number in numbers:
         stamp = S + number
         publisher.publish(cell.messages.joint_state(stamp, ROBOT.joint_names, np.zeros(6)))
-
-
-def numbers(path):
-    with BagReader(path) as bag:
-        return [m.message.header.stamp.nanosec for m in bag.messages(['/joint_states'])]
 
 
 def test_a_managed_recorder_records_between_two_transitions_and_again(cell, tmp_path):

@@ -11,14 +11,14 @@ import sys
 
 import numpy as np
 import pytest
+from recorder_words import numbers
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
-from weld_twin_msgs_py.bags import BagReader, recover
-from weld_twin_nodes.harness import Cell
+from weld_twin_msgs_py.bags import recover
 
 pytestmark = pytest.mark.cells
 
@@ -26,18 +26,6 @@ ROBOT = catalog.load('ur5')
 NUMBERED = 1_000_000_000
 BLOCKS = 100
 """Half a kilobyte or a kilobyte each, as the shell has it; some hundred messages."""
-
-
-@pytest.fixture
-def cell(tmp_path):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell
-
-
-def numbers(path):
-    """Return the numbers of the messages in a bag, in its order: their nanoseconds."""
-    with BagReader(path) as bag:
-        return [m.message.header.stamp.nanosec for m in bag.messages(['/joint_states'])]
 
 
 def flushed(folder):

@@ -436,7 +436,7 @@ def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp
         ('arm controller', 'is no name'),
     ],
 )
-def test_goals_go_to_a_controller_that_is_named(controller, sentence, messages, capsys):
+def test_goals_go_to_a_controller_that_is_named(controller, sentence, packages, capsys):
     words = ['--ros-args', '-p', f'controller:={controller}']
     assert compensator.main(words) == 2
     assert sentence in capsys.readouterr().err

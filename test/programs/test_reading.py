@@ -4,6 +4,7 @@
 
 import random
 import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -298,6 +299,19 @@ def test_instructions_that_move_nothing_end_nothing():
     start = BEFORE['rapid']
     text = source.replace(start, calls + start, 1)
     assert all(step.end is not None for step in read('rapid', (text,), 'abb_irb1600').steps)
+
+
+@pytest.mark.parametrize('line', ['  Foo a,\n', 'a ' + 'x , ' * 9 + '\n', '  a{\n'])
+def test_what_ends_no_statement_is_read_in_the_time_of_other_lines(line):
+    source = (MADE / 'bracket.mod').read_text().replace('MODULE', line * 20_000 + 'MODULE', 1)
+    begin = time.process_time()
+    read('rapid', (source,), 'abb_irb1600')
+    assert time.process_time() - begin < 20.0  # some seconds; minutes where a statement may go on
+
+
+def test_places_count_their_lines():
+    source = Source('a', 'x\r\ny\n\nz')
+    assert [source.line(place) for place in range(7)] == [1, 1, 1, 2, 2, 3, 4]
 
 
 def test_several_trajectories_in_a_file_are_refused():

@@ -42,7 +42,7 @@ _SHIFTING = re.compile(
 )
 """What lets a move go elsewhere; RTCP is a tool that stands still."""
 _DISPLACING = re.compile(r'Touch Offset (End\b)?', re.I)
-_FRAME_SET = re.compile(r':[ \t]*(UFRAME|UTOOL)\[\s*(\d*)[^=\r\n]*=')
+_FRAME_SET = re.compile(r':[ \t]*(UFRAME|UTOOL)\[\s*(\d*)(?!\d)[^=\r\n]*=')
 _SPEED = re.compile(r'([\d.]+)[ \t]*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)')
 _UNITS = {'mm/sec': 1e-3, 'cm/min': 0.01 / 60.0, 'inch/min': 0.0254 / 60.0}
 SPEED = 0.1

@@ -57,10 +57,10 @@ _OTHER = re.compile(
 """What shifts the points after it, or moves the arm and names neither tool nor point."""
 _CALL = re.compile(
     r'(?:^|(?<=;))[ \t]*(?!RETURN\b|CONNECT\b)([A-Za-z]\w*)(?=[ \t\\])(?!\s*:=)'
-    r'((?:[^;\r\n]|,[ \t]*\r?\n|\r?\n(?=[ \t]*\\))*);',
+    r'((?:[^;\r\n]|,[ \t]*\r?\n|\r?\n(?=[ \t]*\\)){0,1000});',
     re.I | re.M,
 )
-"""A statement that calls an instruction, and its arguments."""
+"""A statement that calls an instruction, and its arguments, no longer than people write them."""
 _OWN_DATA = re.compile(r'v(?:\d+|max)|z\d+|fine')
 """Speeds and zones that every controller has."""
 _ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.\w+)*)\s*:=', re.I)

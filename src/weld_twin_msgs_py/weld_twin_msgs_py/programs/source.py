@@ -18,8 +18,10 @@ and z, so KUKA, FANUC and Yaskawa differ in the order of the numbers alone.
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -183,7 +185,12 @@ class Source:
 
     def line(self, place: int) -> int:
         """Return the number of the line, counted from 1, in which a character stands."""
-        return self.text.count('\n', 0, place) + 1
+        return bisect_left(self._ends, place) + 1
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        """Return where lines end: of long programs they are looked for once, not for every point."""
+        return [end.start() for end in re.finditer('\n', self.text)]
 
     def where(self, place: int) -> str:
         """Return file and line of a character, as messages have it."""

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from weld_twin_lab.belief import trial
 from weld_twin_lab.belief.judged import kept
-from weld_twin_lab.belief.mix import EVERYWHERE, drawn
+from weld_twin_lab.belief.mix import EVERYWHERE
 from weld_twin_lab.belief.there import HALF, there
-from weld_twin_lab.belief.trial import diagnosed, recordings_of, tried
+from weld_twin_lab.belief.trial import diagnosed
 from weld_twin_lab.blind.cause_sizes import site
 
 pytest.importorskip('mujoco')
@@ -17,11 +18,24 @@ SEED, NUMBER = 900003, 1
 
 
 @pytest.fixture(scope='module')
-def seen():
-    """Return an arm with errors everywhere, measured at stations, and what is found of it."""
-    case, *_, small = drawn(SEED, NUMBER, EVERYWHERE)
-    case = replace(case, causes=[*case.causes, *small])
-    return case, diagnosed(case, recordings_of(case))
+def tried_once():
+    """Return an arm with errors everywhere, what is found of it, and the row of that."""
+    told = []
+
+    def noted(case, *recordings, **how):
+        told.append((case, diagnosed(case, *recordings, **how)))
+        return told[-1][1]
+
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(trial, 'diagnosed', noted)
+        row = trial.tried(SEED, NUMBER, EVERYWHERE)
+    ((case, found),) = told
+    return case, found, row
+
+
+@pytest.fixture
+def seen(tried_once):
+    return tried_once[:2]
 
 
 def test_small_errors_stand_at_every_joint(seen):
@@ -45,8 +59,8 @@ def test_nothing_of_a_kind_is_there_once_it_is_taken_out_of_the_arm(seen):
     assert there(replace(case, causes=rest), found)[0]['name'] < HALF
 
 
-def test_a_row_keeps_a_statement_for_every_kind():
-    row = kept(tried(SEED, NUMBER, EVERYWHERE))
+def test_a_row_keeps_a_statement_for_every_kind(tried_once):
+    row = kept(tried_once[2])
     names = [right for kind, _, right, *_ in row['examples'] if kind == 'name of many']
     assert len(names) >= 3
     assert row['kind'] == EVERYWHERE

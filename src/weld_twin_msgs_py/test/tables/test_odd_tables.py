@@ -116,6 +116,21 @@ def test_units_and_columns_are_those_of_the_header(tmp_path, name):
     np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6, err_msg=str(said))
 
 
+def test_rows_in_which_an_instrument_saw_no_target_are_left_out(tmp_path):
+    lost = [2, 5, 6]
+    seen = MM.copy()
+    seen[lost] = 0.0
+    recording, said = of(tmp_path, lines(PLAIN, rows(DEG, seen)))
+    np.testing.assert_allclose(recording.measured.position, np.delete(SEEN, lost, 0), atol=2e-6)
+    np.testing.assert_allclose(recording.joints.q, np.delete(Q, lost, 0), atol=2e-6)
+    assert any('3 rows' in each and 'line 4' in each and 'zero' in each for each in said)
+
+
+def test_a_single_point_at_the_origin_of_the_instrument_is_kept(tmp_path):
+    recording, _ = of(tmp_path, lines(PLAIN, rows(DEG, MM - MM[3])))
+    np.testing.assert_allclose(recording.measured.position, SEEN - SEEN[3], atol=2e-6)
+
+
 def test_unicode_text_of_excel_and_a_real_minus_are_read(tmp_path):
     text = lines(PLAIN, rows(DEG, MM)).replace('-', '\N{MINUS SIGN}')
     recording, _ = of(tmp_path, text.encode('utf-16'))

@@ -43,6 +43,8 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
         if len(raw) > SIZE_LIMIT:
             raise ModelError(f"'{path}' is larger than any diagnosis")
         data = json.loads(raw, parse_int=lambda text: whole(int(text)))
+    except IsADirectoryError:
+        raise ModelError(f"'{path}' is a folder; give the diagnosis.json in it") from None
     except OSError as error:
         raise ModelError(f"diagnosis '{path}' cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

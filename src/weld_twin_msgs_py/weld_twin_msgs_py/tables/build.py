@@ -10,6 +10,7 @@ from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import matrix_from_quaternion
@@ -327,6 +328,14 @@ def own_epoch(path: Path) -> int:
     return 1_000_000_000_000 * (1 + crc32(path.read_bytes()) % 900_000)
 
 
+def _lost(cells: Cells, columns: Columns) -> NDArray[np.bool_]:
+    """Return in which rows an instrument saw no target; a single zero may be the frame's origin."""
+    if not columns.position:
+        return np.zeros(len(cells.rows), bool)
+    zero = (cells.stack(columns.position) == 0.0).all(axis=1)
+    return zero if zero.sum() > 1 else np.zeros_like(zero)
+
+
 def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[str]) -> Cells:
     """Return the cells without the rows to skip and those with a gap in a needed column."""
     needed = columns.joints + columns.position + columns.target + columns.difference
@@ -344,7 +353,13 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
         said.append(
             f'{gaps.size} rows with empty cells left out, the first in line {cells.lines[gaps[0]]}'
         )
-    keep = np.flatnonzero(whole & ~asked)
+    lost = whole & ~asked & _lost(cells, columns)
+    if lost.any():
+        said.append(
+            f'{lost.sum()} rows whose measured position is exactly zero left out, the first in line '
+            f'{cells.lines[int(lost.argmax())]}: instruments write it where they see no target'
+        )
+    keep = np.flatnonzero(whole & ~asked & ~lost)
     if not keep.size:
         raise DataError(f"table '{cells.path}' has no complete row")
     for k, j in np.argwhere(np.abs(values[keep]) > _FARTHEST)[:1]:

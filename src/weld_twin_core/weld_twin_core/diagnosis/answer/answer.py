@@ -91,10 +91,7 @@ def answer(
         if limits is None
         else next_step(result, verdict, limits, alternative),
         actions=_mended(result, effects),
-        model=replace(
-            result.final.model,
-            named=tuple((each.effect.name, each.effect.site) for each in effects),
-        ),
+        model=_model(result, effects),
         evidence=evidence,
         posterior=posterior,
         **_parted(unseen, reported, shares, verdict),
@@ -102,6 +99,12 @@ def answer(
         contacts=contact_spreads(result, unseen),
         **_compared(result, examined, verdict),
     )
+
+
+def _model(result: Search, effects: Sequence[Found]) -> Model:
+    """Return the model, with what of it is named."""
+    named = tuple((each.effect.name, each.effect.site) for each in effects)
+    return replace(result.final.model, named=named)
 
 
 def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:

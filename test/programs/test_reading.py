@@ -183,6 +183,8 @@ IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
         ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[2].X = 5\n', 'set anew'),
         ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[i] = F\n', 'set anew'),
         ('krl', f'FRAME F={FRAME}\n$BASE = F\nF.X = F.X + 10\n', 'set anew'),
+        ('krl', f'POS F={FRAME}\nF = XP1\n$BASE = F\n', 'set anew'),
+        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nbase_data[2] = F\n', 'set anew'),
         ('krl', '$IPO_MODE = #TCP\n', 'the tool stands still'),
         (
             'krl',
@@ -192,6 +194,7 @@ IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
         ('rapid', 'tTorch.tframe.trans.z := 300;\n', 'set anew'),
         ('rapid', 'wobjTable.oframe := DefFrame(p10, p20, p30);\n', 'set anew'),
         ('rapid', 'wobjTable := wobjOther;\n', 'set anew'),
+        ('rapid', 'TTORCH := tOther;\n', 'set anew'),
         ('urscript', f'F = p[0,0,0.1,0,0,0]\nF[2] = 0.3\n{IN_FRAME}', 'worked out'),
         ('urscript', f'F = p[0,0,0.1,0,0,0]\nF = pose_add(F, F)\n{IN_FRAME}', 'worked out'),
         ('urscript', 'T = p[0,0,0.1,0,0,0]\nT[2] = 0.3\nset_tcp(T)\n', 'the numbers of tool T'),
@@ -243,6 +246,13 @@ UR_TOOL = 'set_tcp(p[0,0,{},0,0,0])\n'
             'urscript',
             f'def a():\n{UR_CALLED}{UR_TOOL.format(0.25)}sub()\n{UR_TOOL.format(0.1)}end\n',
             None,
+        ),
+        (
+            'urscript',
+            f'def a():\n{UR_TOOL.format(0.25)}def sub():\nif (g):\nset_tcp(T)\nend\nend\n'
+            + UR_CALLED.splitlines()[1]
+            + '\nend\n',
+            0.25,
         ),
     ],
 )
@@ -296,9 +306,22 @@ def test_moves_of_another_kind_end_what_is_known(language, line):
 def test_instructions_that_move_nothing_end_nothing():
     source = (MADE / 'bracket.mod').read_text()
     calls = 'TPWrite "at " \\Pos:=p10.trans;\npNow := CRobT(\\Tool:=tTorch);\nVelSet 50, 800;\nRETURN;\n'
+    weighed = 'tTorch.tload.mass := 3;\n'
     start = BEFORE['rapid']
-    text = source.replace(start, calls + start, 1)
-    assert all(step.end is not None for step in read('rapid', (text,), 'abb_irb1600').steps)
+    text = source.replace(start, calls + weighed + start, 1)
+    program, own = read('rapid', (text,), 'abb_irb1600'), context('abb_irb1600', 'rapid')
+    pieces = to_moves(program, own.robot, own.controller).pieces
+    assert all(move.kind != 'unknown' for piece in pieces for move in piece)
+
+
+def test_joints_of_several_axes_beside_a_trajectory_are_no_second_one():
+    robot, (name,) = PROGRAMS['joint-trajectory']
+    text = (MADE / name).read_text()
+    beside = 'multi_dof_joint_trajectory:\n  joint_names: []\n  points: []\n'
+    steps = read('joint-trajectory', (beside + text,), robot).steps
+    assert len(steps) == len(read('joint-trajectory', (text,), robot).steps) > 1
+    with pytest.raises(TwinError, match='several trajectories'):
+        read('joint-trajectory', (text + text,), robot)
 
 
 @pytest.mark.parametrize('line', ['  Foo a,\n', 'a ' + 'x , ' * 9 + '\n', '  a{\n'])

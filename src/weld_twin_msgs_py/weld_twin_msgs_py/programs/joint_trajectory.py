@@ -58,14 +58,16 @@ class TrajectoryReader(Reader):
 
     def _order(self, joints: Sequence[str]) -> list[int]:
         """Return which joint of the robot each position is."""
-        result = _NAMES.search(self.text)
-        if result is None:
+        # Goals and plans of MoveIt have an empty one beside it, of joints with several axes.
+        lists = [(r, items) for r in _NAMES.finditer(self.text) if (items := self._items(r.end()))]
+        if not lists:
             raise DataError(f'{self.source.where(0)}: a trajectory needs joint_names')
-        if len(_NAMES.findall(self.text)) > 1:
+        if len(lists) > 1:
             raise DataError(
                 f'{self.source.name}: it holds several trajectories; give each a file of its own'
             )
-        names = [self.text[a:b].strip(' "\'') for a, b in self._items(result.end())]
+        ((result, items),) = lists
+        names = [self.text[a:b].strip(' "\'') for a, b in items]
         if sorted(names) != sorted(joints):
             raise DataError(
                 f'{self.where(result)}: it moves {", ".join(names)}; the robot has '

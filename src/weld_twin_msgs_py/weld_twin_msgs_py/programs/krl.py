@@ -51,7 +51,7 @@ _SET = re.compile(
     re.I | re.M,
 )
 _ASSIGNED = re.compile(
-    r'^[ \t]*(?:(?:GLOBAL|DECL|CONST|FRAME|FDAT)[ \t]+)*([A-Z_]\w*(?:\[\s*\d+\s*\])?)'
+    r'^[ \t]*(?:(?:GLOBAL|DECL|CONST|FRAME|E6POS|POS|FDAT)[ \t]+)*([A-Z_]\w*(?:\[\s*\d+\s*\])?)'
     r'((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)',
     re.I | re.M,
 )
@@ -116,7 +116,7 @@ class KrlReader(Reader):
         self.bases: list[Frame] = []
 
     def read(self) -> Program:
-        self.again = {name.lower(): where for name, where in self.set_again(_ASSIGNED).items()}
+        self.again = self.set_again(_ASSIGNED)
         for file in range(len(self.sources)):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)

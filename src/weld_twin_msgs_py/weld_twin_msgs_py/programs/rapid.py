@@ -63,7 +63,8 @@ _CALL = re.compile(
 """A statement that calls an instruction, and its arguments, no longer than people write them."""
 _OWN_DATA = re.compile(r'v(?:\d+|max)|z\d+|fine')
 """Speeds and zones that every controller has."""
-_ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.\w+)*)\s*:=', re.I)
+_ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.(?!tload\b)\w+)*)\s*:=', re.I)
+"""What may be a tool or a work object, and what part of it; what hangs at a tool moves no frame."""
 _DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)\b', re.I | re.M)
@@ -99,7 +100,7 @@ class RapidReader(Reader):
         self.unit = ''
 
     def read(self) -> Program:
-        self.again = {name.lower(): where for name, where in self.set_again(_ASSIGNED).items()}
+        self.again = self.set_again(_ASSIGNED)
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
         self.in_order(

@@ -67,12 +67,14 @@ class Reader(ABC):
 
         What it is at a move hangs on what ran before, which nobody follows here.
 
-        pattern: its first group is the name, its second is empty where the whole is set.
+        pattern: its first group is the name, its second is empty where the whole is set. Names are
+        in lower case where it ignores case, as its language does.
         """
         out, whole = dict[str, str](), set[str]()
         for source, text in zip(self.sources, self.texts, strict=True):
             for match in pattern.finditer(text):
                 name = re.sub(r'\s', '', match[1])
+                name = name.lower() if pattern.flags & re.IGNORECASE else name
                 if match[2] or name in whole:
                     out.setdefault(name, source.where(match.start(1)))
                 whole.add(name)

@@ -47,7 +47,8 @@ OTHER_MOTION = (
 OTHER_TOOL = Frame('set_tcp', why='set_tcp stands in other routines, and not with one value')
 """The tool of a routine that has not set its own."""
 _WORD = re.compile(
-    rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(?:def|thread)\s)'
+    rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'
+    r'(?:if|while|for|(end))\b)'
 )
 _ASSIGNED = re.compile(
     r'(?:^|(?<=;))[ \t]*(?:(?:global|local)[ \t]+)?([A-Za-z_]\w*)((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)'
@@ -70,12 +71,20 @@ class UrscriptReader(Reader):
 
     def read(self) -> Program:
         self._declare()
+        blocks: list[Frame | None] = []  # those that are open; of a routine the tool around it
         for result in _WORD.finditer(self.text):
             if result[5]:
                 self._statement(result)
-            else:
+            elif result[6]:
+                blocks.append(self.tool)
                 self.new_piece(result)
                 self.tool = OTHER_TOOL if self.routines > 1 else self.tool
+            elif not result[7]:
+                blocks.append(None)
+            elif blocks and (around := blocks.pop()) is not None:
+                # To define a routine moves nothing: what stands around it goes on as before.
+                self.program.new_piece()
+                self.tool = around
         self.settle(OTHER_TOOL, self.tools, tool=True)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])

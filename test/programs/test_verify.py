@@ -171,6 +171,17 @@ def test_what_was_corrected_is_not_corrected_twice(cell, tmp_path):
     assert said.code == 2 and 'corrected already' in said.err and not (tmp_path / 'again').exists()
 
 
+def test_a_program_of_which_no_point_was_moved_may_be_corrected(cell, tmp_path):
+    (tmp_path / 'none.yaml').write_text('[]')
+    words = ('--robot', cell / 'robot.yaml', '--out')
+    none = ('--model', tmp_path / 'none.yaml')
+    said = weld_twin('correct', MADE / FILES[0], *words, tmp_path / 'same', *none)
+    assert said.code == 0, said.err
+    model = ('--model', cell / 'found' / 'diagnosis.json')
+    said = weld_twin('correct', tmp_path / 'same' / FILES[0], *words, tmp_path / 'out', *model)
+    assert said.code == 0, said.err
+
+
 @pytest.mark.parametrize(
     ('robot', 'model'),
     [('robot.yaml', 'effects.yaml'), ('robot.urdf', 'effects.yaml'), ('', 'robot_effects.yaml')],

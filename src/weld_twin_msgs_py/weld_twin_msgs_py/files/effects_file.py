@@ -44,9 +44,10 @@ def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
         Path(path).read_text(encoding='utf-8', errors='replace')
     ):
         if (kinematics == fingerprint(robot)) == (word == 'Not '):
+            own = 'the corrected robot.yaml beside it' if word else 'the robot that was diagnosed'
             raise ModelError(
-                f"effects file '{path}' does not go with the robot {robot.name!r} that was given: it "
-                f'goes with {"a corrected" if word else "the nominal"} one, as its first line says'
+                f"effects file '{path}' does not go with the robot {robot.name!r} that was given: its "
+                f'head says that it goes with {own}; give that one'
             )
     try:
         return effects_from_list(entries, robot)

@@ -48,7 +48,8 @@ def _refuse_corrected(program: Path) -> None:
         content = read_json(beside)
     except DataError:
         return
-    if content.get('program') == program.name and content.get('moves'):
+    moved = any(move.get('moved_m') or move.get('turned_rad') for move in content.get('moves', ()))
+    if content.get('program') == program.name and moved:
         raise DataError(
             f"'{program}' was corrected already, as '{beside.name}' beside it says, and would be "
             'corrected twice; give the program as it was before'

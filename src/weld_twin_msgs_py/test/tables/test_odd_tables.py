@@ -131,6 +131,11 @@ def test_a_single_point_at_the_origin_of_the_instrument_is_kept(tmp_path):
     np.testing.assert_allclose(recording.measured.position, SEEN - SEEN[3], atol=2e-6)
 
 
+def test_a_pin_at_the_origin_is_touched_again_and_again(tmp_path):
+    recording, said = of(tmp_path, lines(PLAIN, rows(DEG, 0.0 * MM)))
+    assert not recording.measured.position.any() and len(recording.joints.q) == len(Q), said
+
+
 def test_unicode_text_of_excel_and_a_real_minus_are_read(tmp_path):
     text = lines(PLAIN, rows(DEG, MM)).replace('-', '\N{MINUS SIGN}')
     recording, _ = of(tmp_path, text.encode('utf-16'))

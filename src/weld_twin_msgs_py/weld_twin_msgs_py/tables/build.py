@@ -329,11 +329,15 @@ def own_epoch(path: Path) -> int:
 
 
 def _lost(cells: Cells, columns: Columns) -> NDArray[np.bool_]:
-    """Return in which rows an instrument saw no target; a single zero may be the frame's origin."""
+    """
+    Return in which rows an instrument saw no target.
+
+    A single zero may be the frame's origin, and so may all: a pin that was touched again and again.
+    """
     if not columns.position:
         return np.zeros(len(cells.rows), bool)
     zero = (cells.stack(columns.position) == 0.0).all(axis=1)
-    return zero if zero.sum() > 1 else np.zeros_like(zero)
+    return zero if 1 < zero.sum() < zero.size else np.zeros_like(zero)
 
 
 def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[str]) -> Cells:
@@ -357,7 +361,8 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
     if lost.any():
         said.append(
             f'{lost.sum()} rows whose measured position is exactly zero left out, the first in line '
-            f'{cells.lines[int(lost.argmax())]}: instruments write it where they see no target'
+            f'{cells.lines[int(lost.argmax())]}: instruments write it where they see no target; if it '
+            'was there, count positions from another origin'
         )
     keep = np.flatnonzero(whole & ~asked & ~lost)
     if not keep.size:

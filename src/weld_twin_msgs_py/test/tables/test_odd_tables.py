@@ -175,6 +175,17 @@ def test_rows_of_a_motion_are_no_stations(tmp_path, step, far, rests):
     np.testing.assert_allclose(recording.measured.t, recording.joints.t)
 
 
+@pytest.mark.parametrize('between', [20.0, 0.1])
+def test_readings_one_after_the_other_at_rest_are_of_stations(tmp_path, between):
+    """Ten a second while the arm stands, and a way to the next posture that no log holds."""
+    many = 4
+    t = (np.arange(12.0)[:, None] * (between + 0.1 * many) + 0.1 * np.arange(many)).reshape(-1, 1)
+    q = np.repeat(Q, many, axis=0) + RNG.normal(scale=1e-6, size=(12 * many, 6))
+    seen = forward(ARM, q)[:, :3, 3] + RNG.normal(scale=1e-5, size=(12 * many, 3))
+    body = rows(t, np.degrees(q), 1e3 * seen)
+    assert of(tmp_path, lines(f'time [s],{PLAIN}', body))[0].joints.static
+
+
 @pytest.mark.parametrize('stamp', ['2041-03-01T08:00:{:02d}', '22400000{:02d}'])
 def test_stamps_that_no_bag_holds_are_told_and_counted_from_the_first(tmp_path, stamp):
     body = [f'{stamp.format(k)},{row}' for k, row in enumerate(rows(DEG, MM))]

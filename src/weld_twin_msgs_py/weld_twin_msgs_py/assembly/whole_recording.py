@@ -42,8 +42,8 @@ def looks_static(robot: Robot, motion: JointMotion, measured: Measurements | Non
     """
     Return whether every joint state is a station at rest.
 
-    Joint states far apart, or joined by motions too fast for the arm. Where something was measured,
-    it was measured once at a station; where nothing was, no velocity tells of a motion.
+    Between stations the arm goes for long, or faster than it can by the stamps. Where something was
+    measured, it was measured once at a joint state; where nothing was, no velocity tells of a motion.
     """
     if measured is None:
         if motion.qd is not None and (abs(motion.qd) > AT_REST).any():
@@ -53,11 +53,14 @@ def looks_static(robot: Robot, motion: JointMotion, measured: Measurements | Non
     if motion.t.size == 1:
         return True
     steps = np.diff(motion.t)
+    speeds = abs(np.diff(motion.q, axis=0)) / steps[:, None]
+    goes = (speeds > AT_REST).any(axis=1)
+    if goes.any():  # else it stands all the time, and readings at one station say nothing
+        steps, speeds = steps[goes], speeds[goes]
     if np.median(steps) >= SPARSE:
         return True
     limit = np.where(np.isfinite(robot.max_velocity), robot.max_velocity, FAST)
-    too_fast = (abs(np.diff(motion.q, axis=0)) > 1.5 * limit * steps[:, None]).any(axis=1)
-    return bool(too_fast.mean() > 0.5)
+    return bool((speeds > 1.5 * limit).any(axis=1).mean() > 0.5)
 
 
 def _once_each(motion: JointMotion, measured: Measurements) -> bool:

@@ -23,7 +23,8 @@ _CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """In the world frame [m/s^2], of a robot file that does not say."""
 _WORKPIECE_KEYS = {'name', 'convention', 'base', 'tool', 'joints', 'links', 'payload'}
-_UNSPOKEN = re.compile(r'[\x00-\x1f\x7f\x85\u2028\u2029]')
+_CONTROL = re.compile(r'[\x00-\x1f\x7f\x85\u2028\u2029]')
+"""Control characters, and what ends a line in Unicode."""
 _TOP_KEYS = _WORKPIECE_KEYS | {'gravity', 'source', 'plausible', 'controller', 'workpiece'}
 _LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
 _JOINT_KEYS = {'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', *_LIMITS}
@@ -149,7 +150,7 @@ class Robot:
         if not self.joint_names:
             raise ModelError(f'robot {self.name!r} has no joints')
         for name in (self.name, *self.joint_names):
-            if _UNSPOKEN.search(name):
+            if _CONTROL.search(name):
                 raise ModelError(
                     f'the name {name!r} has a line end or another control character; names are lines '
                     'of programs and tables, so write it without'

@@ -86,10 +86,10 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
 
 def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
     """Return what the cells of a table mean; the same errors as `read_table`."""
-    return stations(cells, robot, options, said)[0]
+    return table_and_units(cells, robot, options, said)[0]
 
 
-def stations(
+def table_and_units(
     cells: Cells, robot: Robot, options: TableOptions, said: list[str]
 ) -> tuple[Table, Units]:
     """Return what a table means, and the units of the joints whose columns name none."""

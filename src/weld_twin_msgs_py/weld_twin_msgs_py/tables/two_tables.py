@@ -15,7 +15,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
-from .build import BEYOND, LAST_STAMP, Table, own_epoch, stations, table_of
+from .build import BEYOND, LAST_STAMP, Table, own_epoch, table_and_units, table_of
 from .cells import Cells, read_cells
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import joint_angles
@@ -106,7 +106,7 @@ def _moving(
     said: list[str],
     joined: tuple[tuple[str, ...], Array, Array, Array, bool],
 ) -> Table:
-    """Return a motion: what was measured is read as stations first, to find out its units."""
+    """Return a motion: what was measured is read as one table first, to find out its units."""
     names, q, times, own, dated = joined
     inside = np.flatnonzero((own >= times[0]) & (own <= times[-1]))
     if not inside.size:
@@ -117,13 +117,13 @@ def _moving(
     at = np.column_stack([np.interp(own[inside], times, column) for column in q.T])
     both = _joined(log, seen.taken(inside), names, at, own[inside])
     options = replace(options, time_column=None)  # both share one now
-    (still, said_all), units = stations(both, robot, options, said)
-    begin = still.epoch_ns * 1e-9
+    (one, said_all), units = table_and_units(both, robot, options, said)
+    begin = one.epoch_ns * 1e-9
     whole = joint_angles(log, robot, names, options, [], units)
     recording = replace(
-        still,
+        one,
         joints=JointMotion(times - begin, whole),
-        epoch_ns=still.epoch_ns if dated else own_epoch(log.path),
+        epoch_ns=one.epoch_ns if dated else own_epoch(log.path),
         notes=said_all,
     )
     return Table(recording, said_all)

@@ -132,7 +132,7 @@ def left_open(posterior: Posterior) -> list[str]:
     ]
 
 
-_SAID = f'This robot is {CORRECTED}.'
+_OF_ITSELF = f'This robot is {CORRECTED}.'
 _EVERYTHING = 'Every effect of the twin; goes with the nominal robot.'
 _LEFT_OVER = 'What the corrected robot.yaml cannot hold; goes with that, not with the nominal.'
 
@@ -145,7 +145,7 @@ def write_yaml(path: Path, model: Model, notes: Sequence[str]) -> None:
 
 def write_model_urdf(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write the corrected robot as a URDF."""
-    said = [_SAID, *_of_the_robot(model, notes)]
+    said = [_OF_ITSELF, *_of_the_robot(model, notes)]
     write_urdf(path, _corrected(model)[0], overwrite=True, notes=said)
 
 
@@ -219,7 +219,7 @@ def write_all(
 
 def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: GivenUrdf) -> None:
     """Write the corrected robot as the URDF that it was read from, its names kept."""
-    robot, said = _corrected(model)[0], [_SAID, *_of_the_robot(model, notes)]
+    robot, said = _corrected(model)[0], [_OF_ITSELF, *_of_the_robot(model, notes)]
     write_urdf_like(path, given, robot, overwrite=True, notes=said)
 
 

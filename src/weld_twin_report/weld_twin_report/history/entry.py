@@ -72,7 +72,7 @@ def instant(text: str) -> datetime:
     """
     Return the instant that a text names, UTC where it does not say.
 
-    Raises DataError: it is no date.
+    Raises DataError: it is no date, or one before `FIRST_YEAR`.
     """
     try:
         # Python 3.10 does not read the Z that others write for UTC.
@@ -83,7 +83,8 @@ def instant(text: str) -> datetime:
         return at
     except (ValueError, OverflowError):
         raise DataError(
-            f"'{text}' is no date of a recording; write 2026-03-31 or 2026-03-31T14:05"
+            f"'{text}' is no date of a recording ({FIRST_YEAR} or later); write 2026-03-31 or "
+            '2026-03-31T14:05'
         ) from None
 
 

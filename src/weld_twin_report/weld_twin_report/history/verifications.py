@@ -62,7 +62,8 @@ def put_verified(
     """
     Add a verification within a transaction; return its number, None if it was there already.
 
-    Raises DataError: there is no such cell yet, or it has another robot.
+    Raises DataError: there is no such cell yet, it has another robot, or the recording with another
+    date.
     """
     sql, cells, rows = database.sql, database.table('cells'), database.table('verifications')
     # Whoever writes to the same cell waits here, and then sees what was written.

@@ -59,7 +59,7 @@ _ASSIGNED = re.compile(
 _AFTER = re.compile(r'(?:[ \t]*C_\w+)*[ \t]*\Z', re.I)
 """What may stand behind a target."""
 OTHER_TOOL, OTHER_BASE = (
-    Frame(what, why=f'{what} is set in other routines, and not to one value')
+    Frame(what, why=f'the numbers of {what} are set in other routines, and not to the same')
     for what in ('$TOOL', '$BASE')
 )
 """Frames of a routine that has not set its own."""

@@ -44,7 +44,9 @@ OTHER_MOTION = (
     r'track_conveyor_\w+|frame_tracking_\w+|screw_driving'
 )
 """Functions that move the arm, or its frames, in another way."""
-OTHER_TOOL = Frame('set_tcp', why='set_tcp stands in other routines, and not with one value')
+OTHER_TOOL = Frame(
+    'set_tcp', why='the numbers of set_tcp are given in other routines, and not the same'
+)
 """The tool of a routine that has not set its own."""
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'

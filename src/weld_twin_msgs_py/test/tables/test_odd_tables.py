@@ -175,6 +175,19 @@ def test_rows_of_a_motion_are_no_stations(tmp_path, step, far, rests):
     np.testing.assert_allclose(recording.measured.t, recording.joints.t)
 
 
+def test_a_motion_goes_on_where_the_instrument_lost_its_target(tmp_path):
+    q = Q[0] + 0.05 * np.sin(0.2 * np.arange(60.0)[:, None] + np.arange(6.0))
+    seen = forward(ARM, q)[:, :3, 3] + RNG.normal(scale=1e-5, size=(60, 3))
+    shown = np.r_[0:3, 8:30, 45:60]
+    told = np.zeros((60, 3))
+    told[shown] = 1e3 * seen[shown]
+    body = rows(7.0 + 0.1 * np.arange(60.0)[:, None], np.degrees(q), told)
+    recording, _ = of(tmp_path, lines(f'time [s],{PLAIN}', body))
+    np.testing.assert_allclose(recording.joints.q, q, atol=2e-6)
+    np.testing.assert_allclose(recording.measured.t, recording.joints.t[shown], atol=1e-9)
+    np.testing.assert_allclose(recording.measured.position, seen[shown], atol=2e-6)
+
+
 @pytest.mark.parametrize('between', [20.0, 0.1])
 def test_readings_one_after_the_other_at_rest_are_of_stations(tmp_path, between):
     """Ten a second while the arm stands, and a way to the next posture that no log holds."""

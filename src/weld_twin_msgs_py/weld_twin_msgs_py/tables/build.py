@@ -96,8 +96,8 @@ def table_and_units(
     path = cells.path
     try:
         columns = find_columns(cells.header, robot, options)
-        usable = _usable(cells, columns, options, said)
-        return _Reading(usable, robot, columns, options, said).table()
+        usable, log = _usable(cells, columns, options, said)
+        return _Reading(usable, robot, columns, options, said, log).table()
     except DataError as error:
         text = str(error)
         raise DataError(text if str(path) in text else f"table '{path}': {text}") from None
@@ -117,6 +117,8 @@ class _Reading:
     columns: Columns
     options: TableOptions
     said: list[str]
+    log: Cells
+    """Rows with all joints, also those in which nothing was measured."""
 
     def table(self) -> tuple[Table, Units]:
         """Return what the table means, and the units of the joints whose columns name none."""
@@ -135,6 +137,7 @@ class _Reading:
         if looks_static(robot, motion, measured):
             motion = JointMotion(t, q, static=True)
         else:
+            motion = self._whole_motion(motion, units)
             said.append('by their stamps the rows are one motion, not stations at rest')
         recording = Recording(
             cells.path.stem,
@@ -160,6 +163,16 @@ class _Reading:
         if not 0.0 <= t[0] <= t[-1] < LAST_STAMP:
             return own_epoch(self.cells.path), t - first
         return first * 1_000_000_000, t - first
+
+    def _whole_motion(self, seen: JointMotion, units: Units) -> JointMotion:
+        """Return the motion of all rows: where nothing was seen the joints may have turned round."""
+        log, named = self.log, self.columns
+        t, _ = stamps(log, named.time, named.unit(named.time), named.date)
+        if t is None:
+            return seen
+        begin = log.lines.index(self.cells.lines[0])
+        q = joint_angles(log, self.robot, named.joints, self.options, [], units)
+        return JointMotion(t - t[begin] + seen.t[0], q)
 
     def _temperature(self, t: Array) -> Signal | None:
         name = self.columns.temperature
@@ -340,8 +353,10 @@ def _lost(cells: Cells, columns: Columns) -> NDArray[np.bool_]:
     return zero if 1 < zero.sum() < zero.size else np.zeros_like(zero)
 
 
-def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[str]) -> Cells:
-    """Return the cells without the rows to skip and those with a gap in a needed column."""
+def _usable(
+    cells: Cells, columns: Columns, options: TableOptions, said: list[str]
+) -> tuple[Cells, Cells]:
+    """Return the rows with all that is needed, and those with all joints, those to skip in neither."""
     needed = columns.joints + columns.position + columns.target + columns.difference
     needed += columns.rotation + columns.sigma
     needed += () if columns.temperature is None else (columns.temperature,)
@@ -373,4 +388,5 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
             f"{values[keep[k], j]:.3g} is far beyond any robot's; look for slipped columns or "
             'decimal signs, or leave the row out with --skip-rows'
         )
-    return cells.taken(keep)
+    joints = np.isfinite(cells.stack(columns.joints)).all(axis=1)
+    return cells.taken(keep), cells.taken(np.flatnonzero(joints & ~asked))

@@ -212,7 +212,7 @@ def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
 def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     """Return the fit of a set; what was found before starts at its values."""
     found = {Site.of(effect): effect for effect in now.model.found}
-    wanted = sorted({c.part: c for c in chosen}.items(), key=str)
+    wanted = sorted({c.part: c for c in chosen}.items(), key=lambda item: str(item[0]))
     result = tuple[Effect, ...]()
     for (site, order), choice in wanted:
         own = found.get(site)

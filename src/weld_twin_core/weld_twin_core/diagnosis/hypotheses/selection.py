@@ -247,10 +247,10 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool
         # What drives others beyond their limits and stays within its own is no machine's fault.
         barred = {site for site, e in absurd if not makes_room or Site.of(e) == site}
         remaining = [item for item in worth if item[2].site not in barred]
-        if remaining:
-            nats, best, unit = max(remaining, key=lambda item: item[0])
-            best = possible(work, best, [])
-            return _Step(best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed)
+        for nats, one, unit in sorted(remaining, key=lambda item: -item[0]):
+            best = possible(work, one, [])
+            if unit.site in sites(best):
+                return _Step(best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed)
         if not absurd:
             break
         passed |= not all(_misshapen(now.model.robot, effect) for _, effect in absurd)

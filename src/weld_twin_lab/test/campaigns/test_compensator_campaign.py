@@ -36,6 +36,8 @@ from weld_twin_lab.campaigns.compensator import (
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.correcting import program_model
 
+pytestmark = pytest.mark.drawn
+
 KEPT = Path(__file__).parents[4] / 'docs/results/robustness/compensator.json'
 OTHER = 'exit code 2: weld_twin: diagnosis is of the robot ur10e'
 

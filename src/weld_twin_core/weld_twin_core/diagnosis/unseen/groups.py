@@ -297,7 +297,9 @@ def _hanging(maker: Features) -> Array:
     A bracket sags, and a loose tool falls to its lower side: along any axis of the tool by how far
     down each of its axes points.
     """
-    rotation = maker.run.poses.rotation
+    poses = maker.run.poses
+    # A tool that no joint turns has one rotation for all samples.
+    rotation = np.broadcast_to(poses.rotation, (*poses.position.shape, 3))
     down = np.asarray(maker.view.frames.root_rotation @ maker.view.robot.gravity)
     weight = np.einsum('mji,mj->mi', rotation, np.broadcast_to(down, rotation.shape[:2]))
     out = np.zeros((9, 6, len(rotation)))

@@ -14,7 +14,7 @@ from weld_twin_core.effects import Effect, effects_from_list
 from weld_twin_core.errors import ModelError
 
 from .whole_files import write_text
-from .yaml_file import read_yaml, yaml_text
+from .yaml_file import parse_yaml, read_text, yaml_text
 
 _HEAD = re.compile(r'^# (Not |)for kinematics ([0-9a-f]{16})\b', re.M | re.I)
 
@@ -39,10 +39,9 @@ def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
         it goes with another robot; the message names file and entry.
 
     """
-    entries = read_yaml(path, 'effects file')
-    for word, kinematics in _HEAD.findall(
-        Path(path).read_text(encoding='utf-8', errors='replace')
-    ):
+    text = read_text(path, 'effects file')
+    entries = parse_yaml(text, f"effects file '{path}'")
+    for word, kinematics in _HEAD.findall(text):
         if (kinematics == fingerprint(robot)) == (word == 'Not '):
             own = 'the corrected robot.yaml beside it' if word else 'the robot that was diagnosed'
             raise ModelError(

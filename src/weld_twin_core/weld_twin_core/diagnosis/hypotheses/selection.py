@@ -244,7 +244,7 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool
         worth = [item for item in worth if item[0] > beliefs.enter_nats]
         absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
         impossible += [effect for _, effect in absurd]
-        # What drives others beyond their limits and stays within its own is no machine's fault.
+        # A choice that stays within its own limits may enter: what it drives beyond theirs goes then.
         barred = {site for site, e in absurd if not makes_room or Site.of(e) == site}
         remaining = [item for item in worth if item[2].site not in barred]
         for nats, one, unit in sorted(remaining, key=lambda item: -item[0]):

@@ -36,8 +36,11 @@ gc.disable()
 
 
 def pytest_collection_finish():
-    """Look for garbage from now on, and only in what is made from now on."""
+    """Look for garbage from now on, only in what is made from now on, and as seldom as `weld-twin`."""
+    from weld_twin_nodes.cli.main import GARBAGE
+
     gc.freeze()
+    gc.set_threshold(GARBAGE)
     gc.enable()
 
 

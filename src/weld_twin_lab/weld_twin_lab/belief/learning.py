@@ -135,9 +135,10 @@ def restated(examples: Sequence[Example]) -> list[Example]:
 
     def again(example: Example) -> Example:
         features, both = example.features, names[example.case]
-        before, now = (of_whole(own, []) for own in zip(*both, strict=True)) if both else ({}, {})
-        fits = abs(before.get('names', np.inf) - features.get('names', np.nan)) < NEAR
-        if not fits or len(both) != features['told']:
+        if not both or 'names' not in features or len(both) != features['told']:
+            return example
+        before, now = (of_whole(own, []) for own in zip(*both, strict=True))
+        if not abs(before['names'] - features['names']) < NEAR:
             return example
         return example._replace(
             features={**features, **{key: now[key] for key in ('names', 'least name')}}

@@ -103,8 +103,8 @@ def names(found):
 
 def test_a_track_of_another_pitch_and_a_tilt_whose_zero_is_off(tmp_path, robot_file, capfd):
     """The tilt is one with a turn of the root; the track is told by name, in mm."""
-    scale = {'effect': 'gear_ratio', 'joint': 'rail', 'scale': 6e-4}
-    zero = {'effect': 'joint_offset', 'joint': 'tilt', 'offset': -1.2e-3}
+    scale = {'effect': 'gear_ratio', 'joint': 'rail', 'scale': 4e-4}
+    zero = {'effect': 'joint_offset', 'joint': 'tilt', 'offset': -6e-4}
     table_of(tmp_path, [scale], [zero], seed=11)
     found = diagnosed(tmp_path, robot_file, without=())
     sets = names(found)
@@ -123,17 +123,17 @@ def test_a_spring_of_the_tilt_is_told_and_the_urdf_is_given_back(tmp_path, robot
     cell = Robot.from_mapping(yaml.safe_load(robot_file.read_text(encoding='utf-8')))
     write_urdf(tmp_path / 'cell.urdf', cell)
     spring = {'effect': 'joint_compliance', 'joint': 'tilt', 'compliance': 4e-6}
-    zero = {'effect': 'joint_offset', 'joint': 'l', 'offset': 1.5e-3}
+    zero = {'effect': 'joint_offset', 'joint': 'l', 'offset': 7e-4}
     table_of(tmp_path, [zero], [spring], seed=12)
     more = ('--base-link', 'world', '--tip-link', 'tool')
     found = diagnosed(tmp_path, tmp_path / 'cell.urdf', *more)
     told = {(e['effect'], e['joint']): e['parameters'] for e in found['verdict']['effects']}
     assert told['joint_compliance', 'tilt']['compliance'] == pytest.approx(4e-6, rel=0.1)
-    assert told['joint_offset', 'l']['offset'] == pytest.approx(1.5e-3, rel=0.05)
+    assert told['joint_offset', 'l']['offset'] == pytest.approx(7e-4, rel=0.05)
     better = read_urdf(tmp_path / 'found' / 'robot.urdf', 'world', 'tool')
     assert better.joint_names == NAMES
     off = better.theta[4] - read_urdf(tmp_path / 'cell.urdf', 'world', 'tool').theta[4]
-    assert off == pytest.approx(1.5e-3, rel=0.1)
+    assert off == pytest.approx(7e-4, rel=0.1)
 
 
 def test_programs_without_external_axes_refuse_a_positioner_in_one_sentence(
@@ -195,8 +195,8 @@ def test_a_positioner_that_stands_centimetres_elsewhere_is_no_other_robot(tmp_pa
 
 def test_zeros_on_both_sides_are_not_told_as_a_root_for_sure(tmp_path, robot_file):
     """A track and a tilt whose zeros are off look together like a positioner that stands elsewhere."""
-    slid = {'effect': 'joint_offset', 'joint': 'rail', 'offset': 9e-4}
-    zero = {'effect': 'joint_offset', 'joint': 'tilt', 'offset': 1.4e-3}
+    slid = {'effect': 'joint_offset', 'joint': 'rail', 'offset': 4e-4}
+    zero = {'effect': 'joint_offset', 'joint': 'tilt', 'offset': 6e-4}
     table_of(tmp_path, [slid], [zero], seed=43)
     found = diagnosed(tmp_path, robot_file)
     told = set().union(*names(found))

@@ -27,7 +27,7 @@ from weld_twin_nodes.cli import main
 from weld_twin_nodes.streams.twin_stream import JointStream
 
 ROBOT = load('ur10e')
-SOFT = {'shoulder_lift_joint': 3e-5, 'elbow_joint': 5e-5}
+SOFT = {'shoulder_lift_joint': 6e-6, 'elbow_joint': 1e-5}
 CAUSES = [
     {'effect': 'joint_compliance', 'joint': joint, 'compliance': value}
     for joint, value in SOFT.items()

@@ -242,7 +242,8 @@ KINDS = {
     # Clocks and streams
     'late': ('clock', lambda c: stamps(c.run, lambda t: t + 0.3)),
     'early': ('clock', lambda c: stamps(c.run, lambda t: t - 0.25)),
-    'another epoch': ('clock', lambda c: stamps(c.own, lambda t: t + 5000.0), NONE),
+    'another epoch': ('clock', lambda c: stamps(
+        c.moves(seconds=12.0), lambda t: t + 5000.0), NONE),
     'clocks that run apart': ('clock', lambda c: stamps(c.run, lambda t: t * 1.005)),
     'play of joint 2 is no clock': ('', lambda c: play(c, 1, -0.08, 2.4), NONE),
     'play of joint 3 is no clock': ('', lambda c: play(c, 2, 0.07, 2.1), NONE),

@@ -12,7 +12,6 @@ import json
 import numpy as np
 import pytest
 import yaml
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY
@@ -34,6 +33,8 @@ NAMES = [f'axis_{k}' for k in range(1, 7)]
 GEOMETRY = {'joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism'}
 OTHERS = ('--exclude-effect', *(REGISTRY.keys() - GEOMETRY))
 """Kinds that need not be tried beside those of the geometry: the fewer, the sooner."""
+FEW = ('--exclude-effect', *(REGISTRY.keys() - {'joint_offset', 'link_length'}))
+"""The same where it is about how well a zero is known."""
 
 
 def flange(q, zeros):
@@ -81,15 +82,15 @@ def board_bag(path, kind, q, poses, covariance):
 
 def test_a_board_counts_less_along_the_line_of_sight(tmp_path, weld_twin):
     rng = np.random.default_rng(8)
-    q = rng.uniform(-0.7, 0.7, (60, 6))
-    zeros = np.array([0.0, 0.0, 1.5e-3, 0.0, 0.0, 0.0])
+    q = rng.uniform(-0.7, 0.7, (40, 6))
+    zeros = np.array([0.0, 0.0, 6e-4, 0.0, 0.0, 0.0])
     board = flange(q, zeros)
-    sizes = np.array([4e-5, 4e-5, 2.5e-3, 2e-3, 2e-3, 1.5e-4])
+    sizes = np.array([1.6e-5, 1.6e-5, 1e-3, 8e-4, 8e-4, 6e-5])
     # The board turns with the tool, and so do the directions in which it is seen well.
-    sight = Rotation.from_rotvec(rng.normal(0.0, 0.3, (60, 3))).as_matrix()
-    turn = np.zeros((60, 6, 6))
+    sight = Rotation.from_rotvec(rng.normal(0.0, 0.3, (40, 3))).as_matrix()
+    turn = np.zeros((40, 6, 6))
     turn[:, :3, :3] = turn[:, 3:, 3:] = sight
-    error = np.einsum('mij,mj->mi', turn, sizes * rng.normal(size=(60, 6)))
+    error = np.einsum('mij,mj->mi', turn, sizes * rng.normal(size=(40, 6)))
     covariance = turn @ np.diag(sizes**2) @ np.swapaxes(turn, 1, 2)
     board[:, :3, :3] = Rotation.from_rotvec(error[:, 3:]).as_matrix() @ board[:, :3, :3]
     board[:, :3, 3] += error[:, :3]
@@ -98,12 +99,12 @@ def test_a_board_counts_less_along_the_line_of_sight(tmp_path, weld_twin):
         board_bag(tmp_path / kind, kind, q, board, covariance)
         out = tmp_path / f'{kind} out'
         words = ('diagnose', tmp_path / kind, '--robot', robot, '--align', 'base,tool')
-        weld_twin(*words, *OTHERS, '--out', out)
+        weld_twin(*words, *FEW, '--out', out)
         found = json.loads((out / 'diagnosis.json').read_text())
         told = {(e['effect'], e['joint']): e for e in found['verdict']['effects']}
         one = told.get(('joint_offset', 'axis_3'))
-        off[kind] = 1.0 if one is None else abs(one['parameters']['offset'] - 1.5e-3)
-    assert off['sure'] < 1e-4
+        off[kind] = 1.0 if one is None else abs(one['parameters']['offset'] - 6e-4)
+    assert off['sure'] < 4e-5
     assert off['plain'] > 2.0 * off['sure']
 
 
@@ -211,12 +212,12 @@ def diagnosed(folder, robot, weld_twin):
 
 
 def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_twin):
-    robot = cell(tmp_path, zeros=np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]))
+    robot = cell(tmp_path, zeros=np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]))
     said, found = diagnosed(tmp_path, robot, weld_twin)
     assert '40 of 40 images tell a pose; points are found within 0.1' in said
     named = [(e['effect'], e['joint']) for e in found['verdict']['effects']]
     assert named == [('joint_offset', 'axis_3')]
-    assert found['verdict']['effects'][0]['parameters']['offset'] == pytest.approx(2e-3, abs=2e-4)
+    assert found['verdict']['effects'][0]['parameters']['offset'] == pytest.approx(1e-3, abs=1e-4)
     assert (tmp_path / 'out' / 'report.html').is_file()
 
 
@@ -242,33 +243,36 @@ def test_mistakes_with_cameras_are_named_from_a_table_of_pixels_alone(tmp_path, 
 
 # Two arms that hold one bar ------------------------------------------------------------
 
-OFF = 2.4e-3
+OFF = 1.2e-3
 MIDDLE = np.array([0.1, 0.2, 0.5, 0.3, 0.6, 0.1, 0.1, 0.15, 0.4, -0.2, 0.8, 0.3])
 FOOT = np.eye(4)
 FOOT[:3, :3], FOOT[:3, 3] = np.diag([-1.0, -1.0, 1.0]), [1.3, 0.1, 0.0]
 
 
 def between(q, zeros):
-    """Return the right hand as the left one has it, (4, 4)."""
-    left, right = flange(q[None, :6], zeros)[0], flange(q[None, 6:], np.zeros(6))[0]
+    """Return the right hand as the left one has it, (M, 4, 4)."""
+    left, right = flange(q[:, :6], zeros), flange(q[:, 6:], np.zeros(6))
     return np.linalg.inv(FOOT @ left) @ right
 
 
 def grips(rng, zeros, count):
     """Return joints of both arms (M, 12) at which the real hands hold the bar."""
-    back, out = np.linalg.inv(between(MIDDLE, zeros)), []
-    while len(out) < count:
-        left = MIDDLE[:6] + rng.uniform(-0.5, 0.5, 6)
+    back = np.linalg.inv(between(MIDDLE[None], zeros))
+    left = MIDDLE[:6] + rng.uniform(-0.5, 0.5, (2 * count, 6))
 
-        def off(right, left=left):
-            away = back @ between(np.concatenate([left, right]), zeros)
-            turn = Rotation.from_matrix(away[:3, :3]).as_rotvec()
-            return np.concatenate([away[:3, 3], 0.3 * turn])
+    def off(right):
+        away = back @ between(np.hstack([left, right]), zeros)
+        turn = Rotation.from_matrix(away[:, :3, :3]).as_rotvec()
+        return np.hstack([away[:, :3, 3], 0.3 * turn])
 
-        found = least_squares(off, MIDDLE[6:], max_nfev=40)
-        if found.cost < 1e-20:
-            out.append(np.concatenate([left, found.x]))
-    return np.array(out)
+    right = np.tile(MIDDLE[6:], (2 * count, 1))
+    for _ in range(15):
+        slope = np.stack([(off(right + e) - off(right)) / 1e-6 for e in 1e-6 * np.eye(6)], axis=-1)
+        step = np.einsum('nij,nj->ni', np.linalg.pinv(slope), -off(right))
+        right += step * np.minimum(1.0, 0.3 / np.abs(step).max(axis=1, keepdims=True).clip(1e-9))
+    held = np.abs(off(right)).max(axis=1) < 1e-9
+    assert held.sum() >= count
+    return np.hstack([left, right])[held][:count]
 
 
 def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path, weld_twin):
@@ -297,4 +301,4 @@ def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path,
     found = json.loads((out / 'diagnosis.json').read_text())['verdict']
     assert found['status'] in ('identified', 'ambiguous')
     (one,) = [e for e in found['effects'] if (e['effect'], e['joint']) == ('joint_offset', 'l3')]
-    assert one['parameters']['offset'] == pytest.approx(OFF, abs=1e-4)
+    assert one['parameters']['offset'] == pytest.approx(OFF, abs=5e-5)

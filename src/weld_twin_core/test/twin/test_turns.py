@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where joints have just turned around, and what a wrong law of lost motion leaves there."""
+"""Where joints have just turned around, and what is left by models that are wrong or lack something."""
 
 from __future__ import annotations
 
@@ -62,8 +62,13 @@ def swinging(rng):
 
 def fitted(robot, t, q, real, effect, rng):
     """Return an effect fitted to what an instrument sees of joints, and how well it does."""
-    seen = forward(robot, real)[:, :3, 3] + rng.normal(scale=2e-5, size=(t.size, 3))
-    problem = Problem((Recording('free', JointMotion(t, q), Measurements(t, seen)),))
+    return fitted_to(robot, JointMotion(t, q), forward(robot, real)[:, :3, 3], effect, rng)
+
+
+def fitted_to(robot, joints, places, effect, rng):
+    """Return the same of places that the tool was at."""
+    seen = Measurements(joints.t, places + rng.normal(scale=2e-5, size=places.shape))
+    problem = Problem((Recording('free', joints, seen),))
     start = Model(robot, (robot.T_world_base,), (), (effect,))
     precision = effect_precision(start)
     scale = robust_scale(problem, problem.residuals(start))
@@ -114,6 +119,38 @@ def test_white_noise_hides_less_of_an_arm_than_chance_might():
     # Of 2,000 samples with 20 um, 128 at a time, one standard error of a variance is (0.8 um)^2.
     assert 0.0 < np.median(hides) < 0.4e-6
     assert 3e-6 < np.median(shows) < 3e-5  # 3e-5 rad at half a metre are 11 um RMS
+
+
+def loose(robot, rng, count):
+    """Return stations, and where a tool is that falls to its lower side by up to 0.2 mm."""
+    q = HOME + rng.uniform(-0.6, 0.6, (count, 6))
+    pose = forward(robot, q)
+    fallen = 2e-4 * np.tanh(pose[:, 2, 0] / 0.1)
+    return JointMotion(5.0 * np.arange(count), q, None, True), pose[:, :3, 3] + (
+        fallen[:, None] * pose[:, :3, 0]
+    )
+
+
+def test_what_a_cause_without_a_name_leaves_of_stations_is_no_noise():
+    """Lone stations do not tell what a model lacks from noise; that it lacks something does."""
+    robot, held = load('ur5'), {False: [], True: []}
+    zero = effect_from_mapping(
+        {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 0.0}
+    )
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        made = fitted_to(robot, *loose(robot, rng, 40), zero, rng)
+        joints, places = loose(robot, rng, 300)
+        twin, again = made[1].twin(0), Recording('again', joints)
+        error = places - twin.poses(again).position
+        for nameless, own in held.items():
+            posterior = allowed(*made, nameless=nameless)
+            covariance = pose_covariances(posterior, twin, again, joints.t)[:, :3, :3]
+            size = np.einsum(
+                'mi,mi->m', error, np.linalg.solve(covariance, error[..., None])[..., 0]
+            )
+            own.append((size < 6.251).mean())  # 90 % of chi squared with three freedoms
+    assert np.mean(held[False]) < 0.88 < np.mean(held[True]) < 0.98
 
 
 @pytest.mark.parametrize(

@@ -220,7 +220,9 @@ def _told(
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)
     result = _alone(_held(result, examined.given.robot), shrink)
-    posterior = allowed(result.problem, result.final.model, result.scale, result.precision, floor)
+    fitted = (result.final.model, result.scale, result.precision)
+    nameless = verdict.status == 'unknown'
+    posterior = allowed(result.problem, *fitted, floor, nameless=nameless)
     if result.final.model.found:
         shrink = elsewhere(shrink, posterior)
     progress('weighed what the data leave open')

@@ -36,7 +36,7 @@ from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
 from .dispersion import dispersion
 from .leftover import Foretold, leftover, told_noise
-from .sizes import Prior, Products, Rows, weighed, with_prior
+from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
@@ -53,7 +53,13 @@ AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 
 
 def allowed(
-    problem: Problem, model: Model, scale: Scale, precision: Array, floor: NoiseFloor
+    problem: Problem,
+    model: Model,
+    scale: Scale,
+    precision: Array,
+    floor: NoiseFloor,
+    *,
+    nameless: bool = False,
 ) -> Posterior:
     """
     Return the models that the recordings allow.
@@ -62,6 +68,7 @@ def allowed(
     precision: prior precision of the found effects' coordinates in that fit, shape (K,); may be
     empty.
     floor: what the recordings themselves say of the instrument's noise.
+    nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
     recordings = problem.recordings
     problem, scale = _thinned(problem, _noisy(scale))
@@ -70,28 +77,20 @@ def allowed(
     rows = _rows(problem, model, scale, what, prior)
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
-    fit = Fit(model, rows.residual)
-    regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
+    unseen = Unseen.of(problem, scale, Fit(model, rows.residual), precision)
+    regions = unseen.by(posture_regions(problem))
     levers, parts = _levers(problem, model, scale), rows.parts(regions.labels)
-    spread = models.covariance
-    # Of stations the discrepancy is as large as makes regions hold that others predict.
-    if not problem.at_rest:
-        drawn = [Conditioning(rows, prior, width, models.noise).rooted for width in models.drawn]
-        spread = spread * dispersion(parts, models.noise / rows.share, drawn)
-    whole = models.mean, spread
+    spread = models.covariance * _dispersed(problem, rows, prior, models, parts)
+    whole, turning = (models.mean, spread), ~np.asarray(model.robot.prismatic)
     foretold = Foretold.of(regions, rows.columns, parts, levers, system.given, whole)
-    noise, turning = told_noise(problem, floor), ~np.asarray(model.robot.prismatic)
-    lost = _lost(problem, model)
-    remaining = leftover(problem, foretold, turning, noise, models.rough, lost)
-    curves = np.split(
-        models.open, what.count - np.cumsum([k.size for k in what.knots[::-1]])[::-1]
-    )
-    fine = [float(np.sqrt((heights**2).mean())) for heights in curves[1:]]
+    noise, rough = told_noise(problem, floor), 1.0 if nameless else models.rough
+    remaining = leftover(problem, foretold, turning, noise, rough, _lost(problem, model))
+    fine = _uneven(models.open, what)
     posterior = Posterior(
         what,
         models.mean,
         spread,
-        plausible_arm.discrepancy(model.robot, remaining, np.array(fine), model.found),
+        plausible_arm.discrepancy(model.robot, remaining, fine, model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
         prior_std=prior.width,
@@ -212,6 +211,23 @@ def _lost(problem: Problem, model: Model) -> Array:
         return np.zeros(model.robot.n)
     shifts = [lost_motion(model.robot, plays, recording) for recording in problem.recordings]
     return np.asarray(np.max([np.ptp(shift, axis=0) for shift in shifts], axis=0))
+
+
+def _dispersed(
+    problem: Problem, rows: Rows, prior: Prior, models: Weighed, parts: list[Products]
+) -> float:
+    """Return how many times as large the covariance is as makes parts foretell each other."""
+    # Of stations the discrepancy is as large as makes regions hold that others predict.
+    if problem.at_rest:
+        return 1.0
+    drawn = [Conditioning(rows, prior, width, models.noise).rooted for width in models.drawn]
+    return dispersion(parts, models.noise / rows.share, drawn)
+
+
+def _uneven(coordinates: Array, what: Directions) -> Array:
+    """Return how uneven the gear of every joint is beyond its waves, RMS of its fine curve [rad]."""
+    begins = what.count - np.cumsum([knots.size for knots in what.knots[::-1]])[::-1]
+    return np.array([np.sqrt((h**2).mean()) for h in np.split(coordinates, begins)[1:]])
 
 
 def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:

@@ -7,7 +7,8 @@ The recordings are cut into regions of posture. Each in turn is predicted by the
 others; what is left over is as large as makes nine of ten of those predictions hold. Of that, what
 the instrument's noise is made of is taken off: noise differs from one sample to the next, what the
 arm does does not. Stations that lie apart do not tell the two from each other. There it counts for
-how much the arm has of all the small errors that could be told.
+how much the arm has of all the small errors that could be told, and all of it is the arm's where the
+model is known to lack something.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
-from weld_twin_core.diagnosis.many.weighed_families import weighed_families
+from weld_twin_core.diagnosis.many.weighed_families import _Case, weighed_families
 from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
@@ -199,3 +199,34 @@ def test_a_fine_ripple_that_two_short_recordings_tell_together_is_named():
     assert sites(found) == [{('transmission_ripple', 'elbow_joint')}]
     assert found.effects[0].effect.order == 29
     assert found.status == 'identified'
+
+
+class LeastSquares:
+    """What plain least squares of one column an effect leaves on parts left out in turn."""
+
+    def __init__(self, columns, target, parts):
+        self.columns, self.target, self.parts = columns, target, parts
+
+    def predict(self, kept):
+        out, kept = np.array(self.target), list(kept)
+        for part in np.unique(self.parts):
+            used = self.parts != part
+            step, *_ = np.linalg.lstsq(self.columns[kept][:, used].T, self.target[used])
+            out[~used] -= step @ self.columns[kept][:, ~used]
+        return out
+
+    @staticmethod
+    def squares(left):
+        return left**2
+
+
+@pytest.mark.parametrize('size, chosen', [(0.6, ['link_length', 'link_twist']), (0.0, [])])
+def test_two_kinds_that_show_only_together_are_chosen_together(size, chosen):
+    """Each takes 4 % off by itself, and both take all."""
+    common, own, noise = np.random.default_rng(5).normal(size=(3, 400))
+    columns, parts = np.array([common + 0.3 * own, common - 0.3 * own]), np.arange(400) // 50
+    view = LeastSquares(columns, size * own + 0.05 * noise, parts)
+    effects = tuple(effect(kind, joint='elbow_joint') for kind in ('link_length', 'link_twist'))
+    case = _Case(load('ur5'), frozenset(), effects, (view,), parts, worth=0.1)
+    assert case.chosen() == chosen
+    assert max(np.median(case.growth([k], [])) for k in (0, 1)) < 0.1

@@ -5,10 +5,11 @@ Which kinds of error unseen data need, of all kinds fitted together, and on whic
 
 All kinds at once predict well, and hardly one of them is missed: the others take its place. So
 kinds are added one after the other, each as large as machines have it, and the one that leaves
-least on unseen data first, until no other takes a tenth off. A kind that not every arm has is one of
-them only where unseen data get worse without it beside all that every arm has. Each is then taken
-out of what was chosen, with all others and the frames fitted anew: a kind is needed where unseen
-data get worse. What would do as well in its place is told beside it.
+least on unseen data first, until no other takes a tenth off. Kinds that resemble each other may show
+only together, as wrong lengths and twists do: where none takes enough off by itself, two may. A kind
+that not every arm has is one of them only where unseen data get worse without it beside all that every
+arm has. Each is then taken out of what was chosen, with all others and the frames fitted anew: a kind
+is needed where unseen data get worse. What would do as well in its place is told beside it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,10 +151,20 @@ class _Case:
         return float(np.median(self.growth(kept, less)))
 
     def chosen(self) -> list[str]:
-        """Return the kinds that unseen data need together, added one by one, and held to it."""
-        out: list[str] = []
+        """Return the kinds that unseen data need together, as long as more of them leave less."""
         open_to = [name for name in self.members if self._in_every_arm(name) or self._beyond(name)]
-        while len(out) < len(open_to) and (best := self._next(out, open_to)) is not None:
+        out = self._needed_of((), open_to)
+        while two := self._next_two(out, open_to):
+            more = self._needed_of((*out, *two), open_to)
+            if self.mean_square(self.of_kinds(more)) >= self.mean_square(self.of_kinds(out)):
+                break
+            out = more
+        return out
+
+    def _needed_of(self, first: Iterable[str], open_to: Sequence[str]) -> list[str]:
+        """Return some kinds with those added that take enough off, one by one, and held to it."""
+        out = list(first)
+        while (best := self._next(out, open_to)) is not None:
             out.append(best)
         while out:
             every = self.of_kinds(out)
@@ -193,6 +205,23 @@ class _Case:
             with_first, with_other = ([*now, *self.members[name]] for name in (first, other))
             return other if self._loss(with_first, with_other) < self.worth else first
         return first
+
+    def _next_two(self, chosen: Sequence[str], open_to: Sequence[str]) -> tuple[str, ...]:
+        """
+        Return the two kinds that take most off together, if they take enough and each needs the other.
+
+        Both have to do some good by themselves: of all pairs some do by chance.
+        """
+        now, order = self.of_kinds(chosen), []
+        others = [name for name in open_to if name not in chosen and self.named(name)]
+        some = [name for name in others if self._loss([*now, *self.members[name]], now) > 0.0]
+        for pair in combinations(some, 2):
+            both = [*now, *self.of_kinds(pair)]
+            fall = self.growth(both, now)
+            without = [self._loss(both, [*now, *self.members[name]]) for name in pair]
+            if min(float(np.median(fall)), *without) >= self.worth:
+                order.append((bool(fall.min() >= 0.0), float(np.median(fall)), pair))
+        return max(order)[2] if order else ()
 
     def weighed(
         self, name: str, chosen: Sequence[str], sizes: tuple[tuple[Site, float], ...]

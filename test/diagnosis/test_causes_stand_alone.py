@@ -16,6 +16,8 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.diagnosis.unseen.folds import posture_regions
+from weld_twin_core.effects.joint_coupling import JointCoupling
+from weld_twin_core.effects.view import View
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 ARM = 'kuka_kr6_r900'
@@ -141,3 +143,24 @@ def test_a_curve_of_the_base_over_the_time_is_one_cause_and_not_two_of_one_share
     held = [cause.members for cause in answer.causes]
     assert answer.status == 'unknown' and any(held), answer.reasons
     assert len({k for members in held for k in members}) == sum(map(len, held))
+
+
+def test_a_wrist_whose_fourth_axis_turns_its_sixth_is_named():
+    # Its drives run through one another; those of an arm with a motor in every joint do not.
+    coupled = ('joint_coupling', 'joint', 'joint_a6', 'source', 'joint_a4', 'ratio', 1e-3)
+    few = all_but('joint_coupling', 'joint_offset', 'gear_ratio', 'transmission_ripple')
+    answer = solved(coupled, robot='kuka_kr6_r900', static=30, exclude=tuple(few))
+    assert sites(answer) == [{('joint_coupling', 'joint_a6')}]
+    (found,) = answer.effects
+    assert found.effect.source == 'joint_a4'
+    assert found.effect.number('ratio') == pytest.approx(1e-3, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ('name', 'many'), [('kuka_kr6_r900', 2), ('fanuc_m10ia', 2), ('ur5', 1), ('franka_panda', 1)]
+)
+def test_drives_run_through_a_wrist_whose_axes_meet(name, many):
+    robot = load(name)
+    still = View(robot, np.zeros(1), np.zeros(1), *np.zeros((2, 1, robot.n)))
+    sources = [seed.source for seed in JointCoupling.seeds(still, robot.joint_names[-1])]
+    assert sources == list(robot.joint_names[-2 : -2 - many : -1])

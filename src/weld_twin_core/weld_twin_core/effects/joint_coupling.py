@@ -5,9 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import combinations
 
+import numpy as np
+
+from ..arm.chain import frames
 from ..arm.channels import Shift
 from ..arm.robot import Robot
+from ..arm.vectors import cross, dot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect, LinearEffect
@@ -15,6 +20,12 @@ from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Stage, Value, View
 from .wording import number
+
+_POSTURES = np.array([0.4, 1.0])
+"""Positions [rad or m] of all joints at which axes are looked at; at zero many arms are straight."""
+_MEETING = 0.01
+"""Distance [m] below which axes meet: of the bundled wrists they do within the digits of a table, or
+pass at 85 mm or more."""
 
 
 class _Search(SearchHooks):
@@ -69,11 +80,20 @@ class JointCoupling(LinearEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """Yield one instance per neighbour along the chain, where gears share a housing."""
-        i = view.robot.index(str(joint))
-        for k in (i - 1, i + 1):
-            if 0 <= k < view.robot.n:
-                yield cls(str(joint), view.robot.joint_names[k], 0.0)
+        """
+        Yield an instance for every joint whose gear shares a housing with that of this one.
+
+        These are its neighbours along the chain. Of a wrist whose last three axes meet in a point
+        the drives run through one another: there the first turns the third, too.
+        """
+        robot = view.robot
+        i, last = robot.index(str(joint)), robot.n - 1
+        sources = [i - 1, i + 1]
+        if i == last and _spherical_wrist(robot):
+            sources.append(last - 2)
+        for k in sources:
+            if 0 <= k <= last:
+                yield cls(str(joint), robot.joint_names[k], 0.0)
 
     def remedy(self, robot: Robot) -> str:
         source = self.source
@@ -82,3 +102,17 @@ class JointCoupling(LinearEffect):
             f'Enter a coupling of {source} into {self.site}: {number(90.0 * ratio)} deg for every 90 '
             'deg.'
         )
+
+
+def _spherical_wrist(robot: Robot) -> bool:
+    """Return whether the last three axes meet in a point, whatever the posture."""
+    wrist = range(robot.n - 3, robot.n)
+    if wrist[0] < robot.behind or robot.prismatic[wrist].any():
+        return False
+    rows = frames(robot, _POSTURES[:, None] * np.ones(robot.n)).rows
+    for one, other in combinations((rows[i] for i in wrist), 2):
+        normal = cross(one.z, other.z)
+        apart = np.abs(dot(other.z_point - one.z_point, normal))
+        if (apart >= _MEETING * np.sqrt(dot(normal, normal))).any():
+            return False
+    return True

@@ -35,11 +35,11 @@ near half a turn it vanishes."""
 
 def skew(vector: Array) -> Array:
     """Return the cross-product matrices, shape (..., 3, 3), of vectors, shape (..., 3)."""
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(
-        vector.shape[:-1] + (3, 3)
-    )
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    out = np.zeros((*vector.shape, 3), dtype=vector.dtype)
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out
 
 
 def _series(angle: Array) -> tuple[Array, Array, Array]:

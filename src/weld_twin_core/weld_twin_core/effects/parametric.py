@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from math import isfinite
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -55,7 +56,11 @@ class Parametric:
         if '_sound' in self.__dict__:
             return
         for parameter in self.parameters:
-            value = self._numeric(parameter, getattr(self, parameter.name))
+            given = getattr(self, parameter.name)
+            plain = isinstance(given, float) and parameter.size < 2 and isfinite(given)
+            if plain and parameter.lower <= given <= parameter.upper:
+                continue  # most are; arrays of one number take thirty times as long to look at
+            value = self._numeric(parameter, given)
             if parameter.size > 1 and (value.ndim == 0 or value.shape[-1] != parameter.size):
                 raise ModelError(
                     f'{self.name}: {parameter.name} needs {parameter.size} numbers, '

@@ -75,10 +75,10 @@ def rotation_vector(matrix: Array) -> Array:
     if not matrix.size:
         return np.zeros(matrix.shape[:-2] + (3,))
     # sin(angle) times the axis, and cos(angle)
-    sine = 0.5 * np.stack(
-        [matrix[..., k - 1, k - 2] - matrix[..., k - 2, k - 1] for k in range(3)], axis=-1
-    )
-    cosine = 0.5 * (np.trace(matrix, axis1=-2, axis2=-1) - 1.0)
+    sine = np.empty(matrix.shape[:-1])
+    for k in range(3):
+        sine[..., k] = 0.5 * (matrix[..., k - 1, k - 2] - matrix[..., k - 2, k - 1])
+    cosine = 0.5 * (matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2] - 1.0)
     if cosine.min() < LARGE_TURN:
         return _from_quaternion(quaternion_from_matrix(matrix))
     length = np.sqrt((sine**2).sum(axis=-1))

@@ -130,8 +130,10 @@ class Features:
         channels = list({channel for shift in shifts for channel in shift})
         if len(channels) == 1 and channels[0][0] != 'tau':
             # One joint's hundred ripple orders share its column.
-            sizes = [np.broadcast_to(s.get(channels[0], 0.0), self.at.shape) for s in shifts]
-            return np.stack(sizes)[:, None] * self.column(channels[0])
+            sizes = np.zeros((len(shifts), 1, *self.at.shape))
+            for size, shift in zip(sizes, shifts, strict=True):
+                size[:] = shift.get(channels[0], 0.0)
+            return sizes * self.column(channels[0])
         result = [self.pose_change(shift) for shift in shifts]
         return np.stack(result) if result else np.zeros((0, 6, self.at.size))
 

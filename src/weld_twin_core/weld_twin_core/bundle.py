@@ -61,7 +61,7 @@ _TOGETHER = 64
 _SINGULAR = 1e9
 """Condition from which on images tell no pose."""
 _BEYOND = 1.1
-"""Of the size of an image, from where on a pixel is outside: where the size is not told it follows
+"""Of the size of an image, from where on a pixel is outside: where the size is not given it follows
 from the centre, which is off by some per cent."""
 LOOSEST, LOOSER = 10.0, 1.5
 """Times what was said that the points of a target may turn out to be off, and from where on that is

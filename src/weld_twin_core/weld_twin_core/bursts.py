@@ -118,7 +118,7 @@ def evenly(first: float, step: float, lost: NDArray[np.int_], size: int, count: 
 
 
 ONE_CLOCK = 'Stamp both streams with one clock, or synchronise the two (PTP, NTP)'
-"""The remedy, in the imperative, wherever two clocks are told of."""
+"""The remedy, in the imperative, wherever two clocks are reported."""
 
 
 def apart(joints: tuple[float, float], measured: tuple[float, float]) -> str | None:

@@ -21,7 +21,7 @@ _TINY = 1e-12
 @dataclass(frozen=True, eq=False)
 class PoseNoise:
     """
-    Noise of measured poses or points, told with them.
+    Noise of measured poses or points, given with them.
 
     Examples
     --------
@@ -38,7 +38,7 @@ class PoseNoise:
     [rad], where poses were measured, shape (M, c, c). Shifts among each other are equally sure
     then, and so are turns; which of the two are surer, a fit finds out."""
     typical: Array
-    """Standard deviation of each row, if the noise is as told, shape (c,) [m, rad]."""
+    """Standard deviation of each row, if the noise is as given, shape (c,) [m, rad]."""
     sigma: Array
     """Of a coordinate of each position, all three joined by their mean square, shape (M,) [m]."""
 

@@ -85,7 +85,7 @@ def _count(seen: Sightings) -> int:
 
 
 def _views(seen: Sightings) -> list[View]:
-    """Return where every target is in every image of every camera, where that can be told."""
+    """Return where every target is in every image of every camera, where the image settles it."""
     key = (seen.image * len(seen.cameras) + seen.camera) * len(seen.targets) + seen.target
     order = np.argsort(key, kind='stable')
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))

@@ -38,7 +38,7 @@ class Camera:
 
     @property
     def image(self) -> Array:
-        """Return width and height [px]; where they were not told, the centre is in the middle."""
+        """Return width and height [px]; where they were not given, the centre is in the middle."""
         return 2.0 * self.lens.centre if self.size is None else np.array(self.size, dtype=float)
 
     def as_mapping(self) -> dict[str, Any]:

@@ -125,7 +125,7 @@ class BearingTilt(LinearEffect):
         yield cls(str(joint), second=np.zeros(4))
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the entry of an effects file; without a second wave, none is told."""
+        """Return the entry of an effects file; without a second wave, it lists none."""
         out = super().to_mapping()
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 

@@ -11,7 +11,7 @@ makes up for what lets go, so that z is the sign of the motion, soft below trave
 the same whichever way the joint moves: one while it does, and gone once it rests.
 Viscous friction does what a lag does, and is `servo_lag`.
 
-A loop that never lets go trails as play does, and is told as `backlash`.
+A loop that never lets go trails as play does, and is reported as `backlash`.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class Traits:
     changes_in_use: bool = False
     """Whether use changes it: belts are taken off, tools are knocked, gears wear, loads are swapped."""
     set_at_controller: bool = False
-    """Whether a person can set it first: told before others that are the same on any motion."""
+    """Whether a person can set it first: named before others that are the same on any motion."""
     fitted_with: str | None = None
     """The frame it is an error of, 'base' or 'tool': no cause where that frame is fitted."""
     of_setup: bool = False
@@ -77,7 +77,7 @@ class Traits:
     """What it asks of stations before a fit of many small errors takes it along: 0 as little as
     the geometry, 1 more of them, 2 a great many."""
     by_motion: bool = False
-    """Whether a joint must move for it to be told from a constant."""
+    """Whether a joint must move for it to differ from a constant."""
     everywhere: bool = False
     """Whether a prediction allows for it on every joint, or clock, where it was not found."""
     lacking: str = ''

@@ -11,7 +11,7 @@ linear, and follow a pull that changes little over the reach; near the place whe
 held its direction turns faster than they can.
 
 The pull is a load: joints yield to it by their compliance, as they do to a payload. So it shows
-only where the joints' springs are known, and it is told from a payload by what pulls sideways, and
+only where the joints' springs are known, and it differs from a payload by what pulls sideways, and
 from the springs themselves because weights do not pull so. A torque of its own on each wrist joint
 would need numbers of its own for each, and over one joint's angle it would be a ripple of order
 one.

@@ -39,7 +39,7 @@ def table() -> dict[tuple[str, str], Plausible]:
 
 
 def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:
-    """Return spread and range of a parameter on a robot; as wide as can be where none is told."""
+    """Return spread and range of a parameter on a robot; as wide as can be where none is given."""
     kind = REGISTRY.get(effect)
     each = next((p for p in kind.parameters if p.name == parameter), None) if kind else None
     result = (each and each.range) or _UNKNOWN

@@ -30,7 +30,7 @@ from .view import Parameter, Stage, Value, View
 from .wording import size
 
 _DAMPINGS = (0.3, 0.4, 0.55, 0.75)
-"""Dampings of loops that a search starts from; a stiffer one is hardly told from first order."""
+"""Dampings of loops that a search starts from; a stiffer one hardly differs from first order."""
 _SWINGING = 0.35
 """Share of the usual misfit that is left where inertia is in the formula: on a servo axis (the
 recording EMPS) a lag of first order beside friction misses 1.8 % of the trail, a loop that swings

@@ -13,11 +13,11 @@ import numpy as np
 from ..arrays import Array
 
 _LEAST_MM = 0.005
-"""Shift of a frame [mm] that is not told: no arm repeats that well."""
+"""Shift of a frame [mm] that is not reported: no arm repeats that well."""
 _FINE = 1e-3
-"""Length [m] below which three decimals of mm are told: a controller takes no more."""
+"""Length [m] below which three decimals of mm are reported: a controller takes no more."""
 _LEAST_DEG = 0.0003
-"""Turn of a frame [degrees] that is not told: a metre away it moves the tool by 0.005 mm."""
+"""Turn of a frame [degrees] that is not reported: a metre away it moves the tool by 0.005 mm."""
 
 TURNED_ROUND = (
     'X is the recorded reading with its sign turned round: a controller that shows the joint as '

@@ -34,7 +34,7 @@ _YEAR = 365.25
 MOST = 8
 """Changes looked for; an arm with more of them was rebuilt."""
 _ALIKE = 6.0
-"""Fall of the sum of squares by which another coordinate may explain less and still be told as alike:
+"""Sum of squares by which another coordinate may explain less and still be reported as alike:
 three nats, odds of twenty to one."""
 _DATED = 3.84
 """Fall within which another instant is as likely: 95 % of chi-square with one degree of freedom."""
@@ -42,12 +42,12 @@ _SEASON_SPAN = 0.5
 """Share of a year that must be covered before a season is looked for: what is shorter than half a wave
 is a trend."""
 _NAMED = 3.0
-"""Nats by which a coordinate that a diagnosis has named goes before one that none has: twenty to one."""
+"""Log Bayes factor by which a coordinate that a diagnosis has named goes before others: 20 to 1."""
 _LIKELY = 3.0
-"""Nats by which a coordinate that use can change goes before one that it cannot: twenty to one."""
+"""Log Bayes factor by which a coordinate that use can change goes before others: twenty to one."""
 _FRESH = 6.0
 """By how much more a step before the last diagnosis has to explain: its noise is new in every look, that
-of earlier steps was looked at before. Three nats; a step that is large is told at once all the same."""
+of earlier steps was looked at before. Three nats; a large step is reported at once all the same."""
 _ALARMS = 12.0 / 52.0
 """
 False alarms allowed in one look, were all that is tried independent. It is not: steps a week apart
@@ -149,7 +149,7 @@ class _Look(NamedTuple):
     bar: Array
     """Shape (shapes, P)."""
     sooner: Array
-    """Nats by which a coordinate goes before others that explain as much, shape (P,)."""
+    """Log prior odds of a coordinate before others that explain as much, shape (P,)."""
 
     def next(self, result: Sequence[Term]) -> tuple[Term, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""

@@ -176,12 +176,12 @@ class _JointLine:
     """Joint positions as a function of arc length: the same place gives the same posture."""
 
     def __init__(
-        self, robot: Robot, path: Path, torch: Torch, seed: Array | None, reported: Array | None
+        self, robot: Robot, path: Path, torch: Torch, seed: Array | None, external: Array | None
     ) -> None:
-        reported = rest(robot)[None] if reported is None else np.atleast_2d(reported)
-        self.axes = CarriedArm(robot, reported.shape[1])
+        external = rest(robot)[None] if external is None else np.atleast_2d(external)
+        self.axes = CarriedArm(robot, external.shape[1])
         self.robot, self.path, self.torch = self.axes.arm, path, torch
-        self._external = _along(reported, path.length)
+        self._external = _along(external, path.length)
         self._first = path.sample(np.zeros(1))
         count = int(np.ceil(path.length / min(path.length / 256.0, path.detail / 24.0)))
         grid = np.linspace(0.0, path.length, count + 1)
@@ -219,14 +219,14 @@ class _JointLine:
         return missing(after, before) / (2.0 * _DIFFERENCE)
 
 
-def _along(reported: Array, length: float) -> Callable[..., Array]:
+def _along(external: Array, length: float) -> Callable[..., Array]:
     """Return positions and, of order 1, their slopes at arc lengths, without overshoot between."""
-    if len(reported) == 1:
+    if len(external) == 1:
         return lambda s, order=0: np.broadcast_to(
-            reported[0] * (order == 0), (*s.shape, reported.shape[1])
+            external[0] * (order == 0), (*s.shape, external.shape[1])
         )
     course: Callable[..., Array] = PchipInterpolator(
-        np.linspace(0.0, length, len(reported)), reported
+        np.linspace(0.0, length, len(external)), external
     )
     return course
 

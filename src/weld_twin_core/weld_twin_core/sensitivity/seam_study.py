@@ -21,7 +21,7 @@ from ..twin.poses import Poses
 from ..twin.twin import Twin
 
 POINTS = 200
-"""Path points a study looks at unless it is told otherwise."""
+"""Path points that a study looks at unless another number is given."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from ..errors import DataError
 from .outcome import Outcomes, refuse_unfinite
 
 _PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
-"""What the distribution is told by [%]."""
+"""Percentiles by which the distribution is reported [%]."""
 _COVERAGE = 0.95
 """Confidence of the intervals of the percentiles."""
 

@@ -44,7 +44,7 @@ _AT_REST = 1e-9
 _SURE_AT = 24
 """Places of a goal where it is asked how sure the model is; it changes slowly along a motion."""
 _HOLDS = 0.9
-"""Share of the models which the recordings allow whose error stays within the bound that is told. What
+"""Share of the models which the recordings allow whose error stays within the promised bound. What
 is left over on unseen postures is sized for as many."""
 _HERE = 2e-5
 """Distance of a joint [rad or m] from where a goal begins that is noise of its encoder."""
@@ -99,7 +99,7 @@ class CorrectedGoal:
     after: float
     """Expected RMS distance of the real tool from where the goal means it [m]."""
     bound: float | None
-    """Largest distance on the way that is told beforehand not to be exceeded [m]; None where the
+    """Bound on the distance on the way, promised beforehand [m]; None where the
     model says nothing of how sure it is."""
     waits: float = 0.0
     """How much later the goal begins, so that the correction sets in smoothly [s]."""
@@ -186,7 +186,7 @@ class _Work:
         )
 
     def _left(self) -> list[str]:
-        """Return what is not corrected, and what is not told, in sentences."""
+        """Return what is neither corrected nor promised, in sentences."""
         out = [
             f'{name} is not corrected: it hangs on how the controller follows, not on where it goes'
             for name in not_corrected(self.model)
@@ -305,7 +305,7 @@ class _Work:
         return np.unique(np.linspace(0, count - 1, min(_SURE_AT, count)).round().astype(int))
 
     def _bound(self, after: Array, way: Course) -> float | None:
-        """Return the largest distance on a way that is told not to be exceeded [m]."""
+        """Return the bound on the distance on a way that is promised beforehand [m]."""
         posterior = self.model.posterior
         if posterior is None or self.model.lawless:
             return None
@@ -417,7 +417,7 @@ class _Work:
 
 
 def _bends(goal: Goal, way: Course) -> Array:
-    """Return the accelerations of straight pieces, told by their points alone, shape (K, n)."""
+    """Return the accelerations of straight pieces by their points alone, shape (K, n)."""
     out = np.zeros_like(way.q)
     if goal.t.size > 2:
         speed = np.diff(way.q, axis=0) / np.diff(way.t)[:, None]

@@ -39,7 +39,7 @@ _CLOSED = 1e-11
 _OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
 _EXACT = 2e-10
-"""Largest error [m], of way and turn, that what is told between two looks should have."""
+"""Largest error [m], of way and turn, that the extrapolation between two looks should have."""
 _REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
 _ONWARD = 0.97
@@ -144,7 +144,7 @@ class PoseCorrection:
             self._begin()
             return
         way, size = _away(before, looked.pose)
-        reported = _told(before, self._bend, way, size)
+        reported = _extrapolated(before, self._bend, way, size)
         off = _size((reported - looked.values)[:6])
         if size > _REACH[0]:
             self._bend = (looked.slope - before.slope) / size
@@ -164,12 +164,12 @@ class PoseCorrection:
         way, size = _away(self._at, pose)
         onward = _onward(self._way, way)
         reach = self._reach if onward else min(self._reach, _REACH[1])
-        return _told(self._at, self._bend, way, size)[:6], size / reach
+        return _extrapolated(self._at, self._bend, way, size)[:6], size / reach
 
     def joints(self, pose: Array) -> Array:
-        """Return the joints of what is commanded for a pose, shape (n,), told by the latest look."""
+        """Return the joints commanded for a pose, shape (n,), extrapolated from the latest look."""
         assert self._at is not None
-        return _told(self._at, self._bend, *_away(self._at, pose))[6:]
+        return _extrapolated(self._at, self._bend, *_away(self._at, pose))[6:]
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""
@@ -226,8 +226,8 @@ def _size(way: Array) -> float:
     return sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
-def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:
-    """Return what a look tells of a way (6,) from it, (6 + n,), its slope bent onwards with its size."""
+def _extrapolated(at: Looked, bend: Array, way: Array, size: float) -> Array:
+    """Return a look's value a way (6,) from it, (6 + n,), its slope bent onwards with its size."""
     return np.asarray(at.values + (at.slope + 0.5 * size * bend) @ way)
 
 

@@ -88,7 +88,7 @@ class Posterior:
     alone say, shape (P,), array, shape (P, P)). ``mean`` and ``covariance`` are weighed over
     many."""
     region: tuple[str, float] | None = None
-    """A region that was asked for, as it was told, and the same standard deviation there [m]."""
+    """A region that was asked for, as it was given, and the same standard deviation there [m]."""
     middle: float = 0.0
     """How far to go from the fitted model to the middle to predict best, from 0 to 1."""
 
@@ -169,7 +169,7 @@ class Posterior:
         Zero where the models differ by other coordinates than its own, as waves of a joint do.
 
         effect: of the fitted model.
-        instead: names and joints of effects that may be at work in its place. Its size is told for
+        instead: names and joints of effects that may be at work in its place. Its size is given for
         the case that it is the one and they are not, so it is that given theirs (conditional
         covariance and mean of a normal vector, e.g. Bishop 2006, eq. 2.81): what the fitted model
         has of them would be its own.
@@ -314,7 +314,7 @@ class Posterior:
         """
         Return stations as warm as what was recorded, with nothing on the tool.
 
-        Springs that go by measured efforts are told those that the model's statics expect.
+        Springs that go by measured efforts take those that the model's statics expect.
 
         q: shape (M, n).
         """

@@ -277,7 +277,7 @@ class _Work(NamedTuple):
     def result(
         self, moved: MoveProgram, remaining: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
-        """Return everything that is told of the correction."""
+        """Return the correction with everything reported about it."""
         before, after, ways, sure, drawn = [], [], [], [], []
         for piece in self.travel.pieces:
             aim = self.model.wanted(piece)

@@ -149,7 +149,7 @@ class FedBack:
     """
     Turns what a controller says of its joints into the pose that the arm had then.
 
-    Held against the twin of what was commanded, it shows the servo's own part of a gap.
+    Compared with the twin of what was commanded, it shows the servo's own part of a gap.
 
     part: of the message; empty for what is fed back.
     joint_names: what the controller calls the joints.

@@ -42,7 +42,7 @@ class MeasuringFrame:
     Attributes
     ----------
     remark : str
-        What is to be told of the frame once it is known.
+        What to report about the frame once it is known.
 
     """
 
@@ -95,14 +95,14 @@ class WrenchFrame:
     One of `TOOL_NAMES` means the tool, one of `BASE_NAMES` the base, one of `MEASURING_NAMES` the
     base too where it is not turned against the measuring frame. A name that holds the word base
     but is none of these is refused, for it may be either; every other name is taken for the
-    tool's, and that is told.
+    tool's, and that is reported.
 
     Attributes
     ----------
     meaning : str
         'tool' until a wrench came.
     remark : str
-        What is to be told of the name; empty where it is known.
+        What to report about the name; empty where it is known.
 
     """
 

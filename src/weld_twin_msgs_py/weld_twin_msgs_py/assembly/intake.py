@@ -45,7 +45,7 @@ class Taken(NamedTuple):
     stamp: int
     """[ns]"""
     row: Array
-    """Joints: positions, then velocities, NaN where they are not told, then efforts where they
+    """Joints: positions, then velocities, NaN where they are missing, then efforts where they
     were asked for, shape (width,). Pose: position, quaternion x y z w, sigma [m] or NaN, and its
     covariance where its type has one. Point, sigma: three numbers. Wrench: force and torque.
     Temperature: one number."""
@@ -103,7 +103,7 @@ class Intake:
 
     @property
     def remarks(self) -> list[str]:
-        """Return what is to be told of names and frames that were taken for granted."""
+        """Return what to report about names and frames that were taken for granted."""
         reported = (self.joints, self.measuring_frame, self.wrench_frame)
         joints = self.joints
         remarks = [

@@ -158,7 +158,7 @@ class JointStates:
     robot does, or with one prefix.
     efforts: whether every joint state has to tell the measured efforts of the joints.
     mend: whether velocities are left out that stay zero while joints move. A running node does; of
-    a recording it is told as what it is.
+    a recording it is reported as such.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class JointStates:
     beside : Beside
         The joints that are none of the robot's.
     remark, velocity_remark : str
-        What is to be told of the names, and of velocities; empty where there is nothing.
+        What to report about names and velocities; empty where there is nothing.
 
     """
 

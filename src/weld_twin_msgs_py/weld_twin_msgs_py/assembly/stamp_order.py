@@ -39,7 +39,7 @@ class Forward:
         """
         Begin anew, as after a jump of the clock.
 
-        What the run before still had under way is told by its stamps: they go on where it was.
+        What the run before still had under way shows by its stamps: they go on where it was.
         """
         self._ended = self._ended if self.last is None else self.last
         self.last = None

@@ -41,7 +41,7 @@ class NoTransform(DataError):
 
 
 class NotYet(NoTransform):
-    """It is not known yet: a frame on the way has told of itself up to just before the stamp."""
+    """It is not known yet: a frame on the way was published up to just before the stamp."""
 
 
 class StampedPose(NamedTuple):
@@ -174,7 +174,7 @@ class TransformTree:
             yield frame
 
     def parent(self, frame: str) -> str:
-        """Return the frame that another is told in, empty where nobody told."""
+        """Return the parent frame of another, empty where nobody published it."""
         branch = self._branches.get(frame)
         return '' if branch is None else branch.parent
 
@@ -187,7 +187,7 @@ class TransformTree:
         """
         Return T_target_source, shape (4, 4), at a stamp [ns].
 
-        Raises NotYet: a frame on the way has not told of itself up to the stamp. Raises
+        Raises NotYet: a frame on the way was not published up to the stamp. Raises
         NoTransform: no transforms join the two, or none of the time of the stamp is left.
         """
         up = [target, *self._above(target)]

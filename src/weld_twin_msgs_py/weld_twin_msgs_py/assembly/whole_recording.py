@@ -225,7 +225,7 @@ def _unloaded_before(
     """
     Return the wrench with no load before its first sample, and what can be compared with it.
 
-    A live twin knows no load before it is told one. What was measured meanwhile would show the
+    A live twin knows no load before it hears of one. What was measured meanwhile would show the
     load as a deviation.
     """
     late = (int(wrench.ns[0]) - epoch) * 1e-9

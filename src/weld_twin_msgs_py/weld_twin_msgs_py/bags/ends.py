@@ -26,7 +26,7 @@ def uneven_ends(streams: Mapping[str, Ends]) -> tuple[str, ...]:
     Return a sentence for each stream that begins late or ends early against the others.
 
     streams: of one clock, by name. Silence counts in the steps of the slower one of two streams: a
-    temperature told every ten seconds begins when it pleases.
+    temperature published every ten seconds begins when it pleases.
     """
     if len(streams) < 2:
         return ()

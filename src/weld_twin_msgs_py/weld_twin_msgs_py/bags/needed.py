@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis needs and a bag has not, and how to mend it; told alike wherever it is told."""
+"""What a bag lacks for a diagnosis and how to mend it, in the same words everywhere."""
 
 from __future__ import annotations
 

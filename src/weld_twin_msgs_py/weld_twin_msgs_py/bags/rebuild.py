@@ -76,7 +76,7 @@ def salvage_mcap(path: Path, damage: Damage) -> Iterator[Salvaged]:
     """
     Yield messages in the order of the file, up to the first record that is not whole.
 
-    A chunk whose content does not match its checksum is passed over and told.
+    A chunk whose content does not match its checksum is passed over and reported.
     """
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}

@@ -157,7 +157,7 @@ def mended_source(
     model: Model, nominal: Robot, recording: Recording, setup: int = 0
 ) -> tuple[Recording, str]:
     """
-    Return a recording mended as the diagnosis of a model mended its own, and what is told of it.
+    Return a recording mended as a diagnosis mended its own, and what to report about it.
 
     Where something was measured, the measurements tell whether it needs that: a source that was
     put right meanwhile is left as it is.

@@ -86,7 +86,7 @@ def _points(path: FilePath | str) -> list[list[float]]:
 
 
 def _whole(rows: csv.DictReader[str]) -> Iterator[dict[str, str]]:
-    """Yield the rows; what the reader of tables cannot take is told with its line."""
+    """Yield the rows; what the reader of tables cannot take is reported with its line."""
     try:
         yield from rows
     except csv.Error as error:

@@ -31,7 +31,7 @@ class Scratch:
 
     parent: made if it is not there.
     prefix: of the name, which is drawn. What killed processes left of this prefix is swept first.
-    rescue: told every directory that is swept, before it goes.
+    rescue: called with every directory before it is swept.
 
     Raises OSError: the place cannot be written.
     """
@@ -81,7 +81,7 @@ def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = N
     Parameters
     ----------
     rescue : callable, optional
-        Told every directory before it goes; no other process sweeps it meanwhile.
+        Called with every directory before it goes; no other process sweeps it meanwhile.
 
     """
     own = re.compile(re.escape(prefix) + _DRAWN)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class ShortLicence(NamedTuple):
-    """A licence as ``ament_copyright`` wants it told."""
+    """A licence as ``ament_copyright`` wants it stated."""
 
     name: str
     spdx: str

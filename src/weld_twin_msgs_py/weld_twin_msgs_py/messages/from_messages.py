@@ -115,7 +115,7 @@ def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
     """
     Return the measured efforts of the joints, shape (n,) [N m, or N of a slide].
 
-    Raises DataError: none is told, there are fewer efforts than names, or one is not finite.
+    Raises DataError: there are none, there are fewer efforts than names, or one is not finite.
     """
     values = getattr(message, 'effort', ())
     if not len(values):

@@ -309,7 +309,7 @@ TF_STATIC = Topic(
     steady=False,
 )
 FRAMES = (TF, TF_STATIC)
-"""Listened to where a node is told the name of the measuring frame."""
+"""Listened to where a node is given the name of the measuring frame."""
 ONE_FOR_ALL = (DIAGNOSTICS.name, TF.name, TF_STATIC.name)
 """Topics that all robots share, whatever their namespaces."""
 

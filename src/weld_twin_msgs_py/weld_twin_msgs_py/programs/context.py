@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a reader of programs is told besides the text."""
+"""What a reader of programs is given besides the text."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ counts joint 3 from the ground. Of a URDF the base and the flange are links.
 
 KUKA has E1 to E6 in every position, ABB the six values of an extjoint, FANUC the extended axes E1 to
 E3 of the arm's group and the joints of further groups. No file of a program says which joint of a
-robot file is which, so it is told. All count as the joint does, or the other way round.
+robot file is which, so a user says it. All count as the joint does, or the other way round.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LABELS = {
     'rapid': (r'eax_[a-f]', 'eax_a=rail,eax_b=tilt'),
     'fanuc-ls': (r'E[1-3]|GP[2-8]\.J[1-9]', 'E1=rail,GP2.J1=tilt'),
 }
-"""What external axes are called, and how they are told."""
+"""What external axes are called, and how a user says which is which."""
 BY_NAME = ('joint-trajectory', 'csv')
 """Languages that call joints by their names, those of a positioner and a track like all others."""
 ARM = 6
@@ -63,9 +63,9 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
     """
     Return the external axes of a robot in the order of its joints.
 
-    Raises DataError: it is not told and has to be, the language has none, or it is told wrongly.
+    Raises DataError: it is missing and has to be given, the language has none, or it is wrong.
 
-    given: which is which, as ``E1=rail,E2=-tilt``; empty where it is not told.
+    given: which is which, as ``E1=rail,E2=-tilt``; empty where it is not given.
     """
     names = robot.joint_names[: carrying(robot)]
     listed = ', '.join(names)
@@ -169,7 +169,7 @@ class Controller:
     external: tuple[ExternalAxis, ...] = ()
     """In the order of the robot's first joints, which they are."""
     along: frozenset[str] | None = None
-    """Names of bases that go along with a positioner, in lower case; None where nobody told."""
+    """Names of bases that go along with a positioner, in lower case; None where nobody said."""
     world_known: bool = True
     """Where bases that stand still count from is known. It is not of an arm on a track, unless
     told."""
@@ -270,7 +270,7 @@ def controller_of(
     language: each maker's controller runs its own, on its own robots; on others nothing is
     assumed.
     tools, bases: frames that were given, shape (4, 4) [m].
-    cell: what was told of external axes.
+    cell: what was given about external axes.
     """
     reported = cell or Cell()
     axes = external_axes(reported.external, robot, language)

@@ -91,7 +91,7 @@ class TrajectoryReader(Reader):
 
 
 def _times(text: str, places: Sequence[int]) -> list[float]:
-    """Return the time of every point [s]; empty where they are not told in order."""
+    """Return the time of every point [s]; empty where they are not in order."""
     times = [int(m[1]) + int(m[2]) * 1e-9 for m in _TIME.finditer(text)]
     rises = len(times) == len(places) and all(b > a for a, b in pairwise(times))
     return times if rises else []

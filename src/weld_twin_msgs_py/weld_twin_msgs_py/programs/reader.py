@@ -122,18 +122,18 @@ class Reader(ABC):
         self.routines += 1
         self.program.new_piece()
 
-    def settle(self, inherited: Frame, told: Sequence[Frame], *, tool: bool) -> None:
+    def settle(self, inherited: Frame, own: Sequence[Frame], *, tool: bool) -> None:
         """
         Give moves that stand before any frame of their routine the one that the program sets.
 
         Where it sets several, nobody knows which holds when the routine is called.
 
-        inherited: what stands in these moves. told: what the program sets.
+        inherited: what stands in these moves. own: what the program sets.
         """
-        values = {(f.name, f.why, None if f.value is None else f.value.tobytes()) for f in told}
+        values = {(f.name, f.why, None if f.value is None else f.value.tobytes()) for f in own}
         if len(values) > 1:
             return
-        only = told[0] if told else Frame('')
+        only = own[0] if own else Frame('')
         for piece in self.program.pieces:
             for k, step in enumerate(piece):
                 if tool and step.tool is inherited:

@@ -33,7 +33,7 @@ _FARTHEST = 1e9
 _TOO_GOOD = 2e-6
 """A typical misfit [m] below what any tracker repeats, a fifth of its best."""
 _JUDGED = 300
-"""Rows, evenly over the table, from which units are told: two readings differ in all of them."""
+"""Rows, evenly over the table, from which units are guessed: two readings differ in all of them."""
 LAST_STAMP = 2.0**31
 """Seconds since 1970 that a stamp of ROS can hold, until January 2038."""
 BEYOND = (

@@ -3,7 +3,7 @@
 """
 Logs of controllers and exports of instruments whose form is documented: each is a file in `forms/`.
 
-A `Form` says how such a file is told, and what reads it. Where a line names the columns, a `Format`
+A `Form` says how to recognise such a file, and what reads it. Where a line names the columns, a `Format`
 is all that is needed: which line that is, how many lines above belong to it, and which of the joined
 names mean what. What it does not name is left out: a controller's own idea of the pose is no
 measurement. docs/tables.md lists where each form is documented.
@@ -27,7 +27,7 @@ from weld_twin_core.errors import DataError
 from ..files.csv_text import is_number
 
 _HEAD = 40
-"""Lines at the top in which a format is told and its header found."""
+"""Lines at the top by which a format is recognised and its header is found."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Read(NamedTuple):
 
 
 class Rank(IntEnum):
-    """How surely a form is told; those of a lower rank are asked first."""
+    """How surely a form is recognised; those of a lower rank are asked first."""
 
     BYTES = 0
     """By its first bytes: it is no text."""

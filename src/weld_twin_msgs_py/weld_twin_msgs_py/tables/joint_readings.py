@@ -68,7 +68,7 @@ def joint_angles(
 
     names: the columns, in the robot's order.
     said: sentences are added to it.
-    units: of columns that name none; left out, they are told by the size of the numbers.
+    units: of columns that name none; left out, the size of the numbers decides.
     """
     q = cells.stack(names)
     if units is None:

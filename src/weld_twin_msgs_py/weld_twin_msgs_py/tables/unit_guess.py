@@ -183,7 +183,7 @@ def _by_format(text: str, form: str) -> datetime:
 _ROUNDS = 30
 """Rounds of fitting the frames in turn; a guess of units needs no more digits."""
 _FIRST = 3
-"""Rounds after which the best of several beginnings is told from the others."""
+"""Rounds after which the best of several beginnings stands out from the others."""
 _FAR = 0.02
 """Share of the measured span that a fit may leave before others are begun elsewhere: units differ by
 more, and errors of arms are less."""

@@ -88,7 +88,7 @@ class HealthListener:
         )
 
     def clear(self) -> None:
-        """Forget what was told, not the values."""
+        """Forget what was reported, not the values."""
         self.told.clear()
 
     def of(self, node: str) -> list[tuple[str, str]]:

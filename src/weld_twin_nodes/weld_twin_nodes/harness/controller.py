@@ -123,7 +123,7 @@ class Controller(Node):
 
     def _visited(self, goal: Goal) -> list[float]:
         """
-        Return the times [s] of a goal at which the arm is told to be, the last one first.
+        Return the times [s] of a goal at which the arm is commanded to be, the last one first.
 
         By looks, not by the clock: one that comes late must not leave out where a joint turns.
         """

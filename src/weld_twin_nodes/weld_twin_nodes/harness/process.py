@@ -80,7 +80,7 @@ def _port(number: int) -> socket.socket:
 GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
 AGAIN = 1.0
-"""Seconds after which it is told again."""
+"""Seconds after which it is told to end again."""
 PATIENCE = 60.0
 """Seconds in which a process ends by itself, or never will: nine that load at once on two busy cores
 have taken twenty."""

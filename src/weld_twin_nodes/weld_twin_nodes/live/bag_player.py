@@ -118,7 +118,7 @@ class _Teller:
         self._next = 0.0
 
     def now_and_then(self) -> None:
-        """Tell, unless it was told within the last second."""
+        """Tell, unless it was reported within the last second."""
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + TELL_EVERY
             self._publish()

@@ -57,7 +57,7 @@ and `ros2 launch` ends by force what takes 5 s.
 ACKNOWLEDGED = 0.2
 """Seconds between two looks at who still tells of itself, and that everybody is given."""
 FORWARDS = 10.0
-"""Seconds of a jump of the clock forwards that is told: a bag that is played jumps by its pauses."""
+"""Seconds of a jump of the clock forwards that is reported: a bag that is played jumps by its pauses."""
 KNOWN = 2.0
 """
 Seconds for the middleware to match the subscriptions that the graph tells of. Discovery takes
@@ -257,7 +257,7 @@ class CellNode(TellingNode):
         return partial(plain_poses, part=part, fed_back=fed_back)
 
     def intakes(self) -> Sequence[Intake]:
-        """Return what takes messages in: what it takes for granted is told, not with every message."""
+        """Return what takes messages in; what it takes for granted is reported once."""
         return ()
 
     def look(self) -> None:
@@ -364,7 +364,7 @@ class CellNode(TellingNode):
 
     def serve_until(self, condition: Callable[[], bool], what: str) -> None:
         """
-        Serve until something is told that the node can do nothing without; say what it waits for.
+        Serve until the node has what it can do nothing without; say what it waits for.
 
         Raises ModelError: the node is stopped before.
         """

@@ -128,7 +128,7 @@ class Compensator(ManagedNode):
     Corrects what a planner sends to a controller, whole, or refuses it with a reason.
 
     In the shadow, without ``apply``, goals pass as they are and no pose is sent; what would be added
-    is told all the same.
+    is reported all the same.
     """
 
     settings: ClassVar[tuple[Setting, ...]] = COMPENSATOR_SETTINGS
@@ -376,7 +376,7 @@ class Compensator(ManagedNode):
         if why:
             passed = goal if not applied and self._active else None
             return Decision(passed, why, partial(audit.settle, token, None, 'refused', why), token)
-        if not applied:  # it does not wait for what is only told
+        if not applied:  # it does not wait for what is only reported
             return Decision(goal, '', partial(self._judged_later, goal), token)
         judged, watch = Future(), self._watch
         self._work_out(goal, judged.set_result)

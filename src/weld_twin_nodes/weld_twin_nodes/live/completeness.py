@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the publishers say they sent, held against what was recorded."""
+"""What the publishers say they sent, compared with what was recorded."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SentBook(Book):
         self._listened: dict[str, float] = {}
 
     def take(self, word: Word) -> None:
-        """Take a word, and hold what the node has heard against what was due."""
+        """Take a word, and compare what the node has heard with what was due."""
         super().take(word)
         if word.heard:
             due = {topic: (own, self.due(topic, word.at)) for topic, own in word.heard.items()}
@@ -57,7 +57,7 @@ class SentBook(Book):
         return out
 
     def silent_nodes(self) -> list[str]:
-        """Return the nodes of the project that were met and have not told anything at all."""
+        """Return the nodes of the project that were met and have not said anything at all."""
         return [node for node in self._listened if _ours(node) and node not in self.nodes()]
 
     def meet(self, node: str, now: float) -> None:
@@ -107,7 +107,7 @@ class Shortfall(NamedTuple):
 
 
 def shortfall(sent: Sent | None, recorded: Sent) -> Shortfall | None:
-    """Return what is missing of a topic; None if nothing is, or nobody told."""
+    """Return what is missing of a topic; None if nothing is, or nobody said."""
     if sent is None or recorded.number >= sent.number:
         return None
     late = early = recorded.number == 0

@@ -30,7 +30,7 @@ from .tf_frames import MeasuredInputs
 LOOK_EVERY = 0.5
 """Seconds between two looks at the clocks."""
 BASE_EVERY = 0.1
-"""Seconds between two looks at whether the base is told, until it is known."""
+"""Seconds between two looks at whether the base is published, until it is known."""
 BASE_NOBODY = 0.5
 """Seconds that pairs wait while nobody is there to tell the base: discovery takes a tenth of it."""
 BASE_SOMEBODY = 10.0
@@ -109,7 +109,7 @@ class DeviationAnalyzer(CellNode):
 
     @property
     def waiting_for_base(self) -> int:
-        """Return how many pairs wait to be told in the axes of the base."""
+        """Return how many pairs wait for the axes of the base."""
         return self._deviations.waiting_for_base
 
     def _look_for_base(self) -> None:

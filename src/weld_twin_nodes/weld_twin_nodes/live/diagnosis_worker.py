@@ -32,7 +32,7 @@ _NICENESS = 10
 _DEAD_WITHIN = 1.0
 """Seconds to wait for a process that was killed; one that writes to a dead disk may take for ever."""
 _LAST = 2000
-"""Characters of its standard error that are told: a traceback has about as many."""
+"""Characters of its standard error that are reported: a traceback has about as many."""
 
 
 class Job(NamedTuple):
@@ -118,7 +118,7 @@ def find(job: Job) -> Finding:
     from weld_twin_msgs_py.bags.images import looking
 
     from ..wording.verdict import verdict
-    from ..wording.words import found_name
+    from ..wording.words import effect_name
 
     recording = job.recording
     if job.images and job.names is not None:
@@ -141,7 +141,7 @@ def find(job: Job) -> Finding:
         values[f'unsound: {item.kind}'] = item.sentence
     for result in diagnosis.effects:
         entry = result.effect.to_mapping()
-        values[found_name(result)] = {
+        values[effect_name(result)] = {
             key: value for key, value in entry.items() if key not in ('effect', 'joint')
         }
     measured = recording.measured

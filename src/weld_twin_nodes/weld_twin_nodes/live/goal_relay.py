@@ -4,7 +4,7 @@
 An action in front of a controller's own: goals are decided on, then sent on; all else passes through.
 
 A goal is accepted when the controller has accepted what became of it. The answer to a goal has no
-room for a reason; it is told in the log, on `/diagnostics` and in the audit.
+room for a reason; it is reported in the log, on `/diagnostics` and in the audit.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Decision(NamedTuple):
     why: str
     """Why there is none."""
     settled: Callable[[str], None]
-    """Told whether the controller took it, in words: empty where it did."""
+    """Called with whether the controller took it, in words: empty where it did."""
     token: object = None
     """Of the model it was decided with, for `GoalRelay.since`."""
 

@@ -76,7 +76,7 @@ def header_stamp(message: Any) -> int:
 OK, WARN, ERROR, STALE = range(4)
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 RATE_CHANGE = 3.0
-"""Ratio to the usual rate from which on a rate is told as changed."""
+"""Ratio to the usual rate from which on a rate is reported as changed."""
 USUAL = 15
 """Looks over which the usual rate is taken."""
 SLOW = 2
@@ -181,7 +181,7 @@ class Input:
 
 
 class Health:
-    """The inputs of a node and what else is to be told of it."""
+    """The inputs of a node and what else to report about it."""
 
     def __init__(self, node: str, patience: float) -> None:
         self._node = node
@@ -191,7 +191,7 @@ class Health:
         self.lasting: dict[str, str] = {}
         self.remarks: list[str] = []
         self.running = 'running'
-        """What a node says of itself while nothing else is to be told."""
+        """What a node says of itself while nothing else is to be reported."""
         self.fault = ''
         """What makes the work of the node worthless as long as it lasts; empty for nothing."""
         self._run = time.time_ns()

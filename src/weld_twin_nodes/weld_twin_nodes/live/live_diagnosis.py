@@ -192,7 +192,7 @@ class LiveDiagnosis(ManagedNode):
     Diagnoses a sliding window again and again, in another process.
 
     Nothing is published before a gap was found; from then on every verdict is, so that its end
-    is told too.
+    is reported too.
     """
 
     settings: ClassVar[tuple[Setting, ...]] = (

@@ -4,7 +4,7 @@
 What an input of a running node lacks: by the counts of those who tell them, else by its stamps.
 
 The middleware keeps the last messages for a reader that is late and drops the others without a
-word. Nodes of the project tell with their health how many they sent; what came is held against it.
+word. Nodes of the project tell with their health how many they sent; what came is compared with it.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ OVER = 4.0
 
 
 SETTLES = 3.0
-"""Seconds within which a loss that still grows is told: a burst is over by then, and the number is
+"""Seconds within which a loss that still grows is reported: a burst is over by then, and the number is
 that of all of it."""
 
 
 class Counted:
-    """What came of a topic, held against what its publishers told they sent."""
+    """What came of a topic, compared with what its publishers say they sent."""
 
     def __init__(self, state: Input) -> None:
         self._state = state
@@ -87,7 +87,7 @@ class Losses:
     Attributes
     ----------
     telling : str
-        What is to be told as long as messages go missing; empty where none do.
+        What to report as long as messages go missing; empty where none do.
 
     """
 
@@ -131,14 +131,14 @@ class Losses:
         return out
 
     def ended(self) -> list[str]:
-        """Return what is to be told of a loss that the end of the node cuts short."""
+        """Return what to report about a loss that the end of the node cuts short."""
         if not self.telling:
             return []
         return [f'{self._state.topic}: {self._state.lost:,} messages are missing in all']
 
 
 def _of_clock(seen: Seen) -> list[str]:
-    """Return what is to be told of stamps that jumped."""
+    """Return what to report about stamps that jumped."""
     if seen.back:
         return [f'the stamps begin anew, {seen.back:,.1f} s behind the last one']
     if seen.ahead:

@@ -146,7 +146,7 @@ class RecordedTopic:
     Attributes
     ----------
     announced : str
-        Type that the bag was told of; the writer's to set.
+        Type that the bag knows; the writer's to set.
 
     """
 

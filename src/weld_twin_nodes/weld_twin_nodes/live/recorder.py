@@ -62,7 +62,7 @@ class RecordingRun:
     Writes messages as they arrive, unread, until it is ended.
 
     node: the recorder, with its parameters.
-    done: is told when everything is there, or nothing can be written any more.
+    done: is called when everything is there, or nothing can be written any more.
     joins: it begins at a moment of its own: what was sent before is none of it.
     """
 
@@ -122,7 +122,7 @@ class RecordingRun:
             self._asked.describe(_TEXT(data).data)
 
     def counts(self) -> dict[str, Any]:
-        """Return the messages written by topic, those dropped, and who told how many were sent."""
+        """Return the messages written by topic, those dropped, and who said how many were sent."""
         written, dropped = self._bag.counts()
         counts = {topic: written.get(topic, 0) for topic in self._topics}
         return {**counts, 'dropped': dropped, 'told_by': sorted(self._book.nodes() & self._meet())}
@@ -130,7 +130,7 @@ class RecordingRun:
     # Ending ----------------------------------------------------------------------------------
 
     def end(self) -> None:
-        """Begin to take in what is under way; it is told when all of it is there."""
+        """Begin to take in what is under way; `done` is called when all of it is there."""
         if self._ending_since is None:
             self._ending_since = self._moved = time.monotonic()
             self._timers.append(self._node.every(DRAIN_EVERY, self._complete))
@@ -163,7 +163,7 @@ class RecordingRun:
         return any(self._book.tellers(topic) & alive for topic in lacking)
 
     def _untold(self) -> list[str]:
-        """Return the nodes recorded here that have not told what they sent since the end."""
+        """Return the nodes recorded here that have not said what they sent since the end."""
         there = self._meet()
         silent = self._book.silent_since(self._ending_since or time.monotonic())
         return [node for node in silent if node in there]
@@ -268,7 +268,7 @@ class Recorder(ManagedNode):
 
     def own_topics(self) -> Sequence[str]:
         """
-        Return what it is told to record.
+        Return what it is asked to record.
 
         Raises DataError: a name is none that a topic can have.
         """

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The parameters by which a node is told its robot, its frames, and what its inputs call things.
+The parameters by which a node knows its robot, its frames, and what its inputs call things.
 
 Where the base is may be taken from `/tf` when a node starts; it is watched from then on.
 """
@@ -47,7 +47,7 @@ def base_on_tf(node: CellNode) -> Array:
     Return T_measuring_base, shape (4, 4), once `/tf` tells it.
 
     Raises ModelError: the two frames have no names, `/tf` cannot be read here, or the node is
-    stopped before they are told.
+    stopped before they are known.
     """
     measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
     if not measuring or not base:
@@ -115,7 +115,7 @@ FRAME_SETTINGS = (
 
 
 def measuring_frame(node: CellNode) -> str:
-    """Return the name of the frame in which poses are told."""
+    """Return the name of the frame in which poses are published."""
     return node.setting('measuring_frame') or WORLD
 
 
@@ -270,7 +270,7 @@ def names_topic(name: str) -> bool:
 
 
 def _described(node: CellNode, topic: str, read: Callable[[str], Robot]) -> Robot:
-    """Return the robot that a topic tells; what it tells from then on is held against that."""
+    """Return the robot that a topic tells; what it tells from then on is compared with that."""
     first: list[Robot] = []
     decode = decoder(ROBOT_DESCRIPTION.type)
 

@@ -3,7 +3,7 @@
 """
 A subscription that follows its publishers: in the type they have, and in what they offer.
 
-Who is at the other end of a topic, and why nothing may come from there or arrive there, is told.
+Who is at the other end of a topic, and why nothing may come from there or arrive there, is reported.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from weld_twin_msgs_py.messages.topics import BEST_EFFORT, BY_NAME, VOLATILE, Qo
 from .telling_node import TellingNode
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
-"""What rmw calls a node whose participant has told of its topics and not of its nodes yet."""
+"""What rmw calls a node whose participant has announced its topics and not its nodes yet."""
 
 
 def unheard_publishers(
@@ -75,7 +75,7 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
 
 
 class Senders:
-    """Who publishes an input: told when it is somebody else, as when a controller is switched."""
+    """Who publishes an input: reports when it is somebody else, as when a controller is switched."""
 
     def __init__(self) -> None:
         self._before: frozenset[str] = frozenset()
@@ -140,7 +140,7 @@ def full_name(info: Any) -> str:
 
 
 def named(node: str) -> str:
-    """Return the full name of a node as it is told; the graph may lack it at first."""
+    """Return the full name of a node as it is reported; the graph may lack it at first."""
     return 'a publisher whose name is not known yet' if UNKNOWN in node else node
 
 

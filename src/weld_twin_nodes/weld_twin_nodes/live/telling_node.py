@@ -135,7 +135,7 @@ class TellingNode(Node):
 
     def watch(self, name: str, *, required: bool, steady: bool, hold_last: bool = False) -> Input:
         """
-        Return a new input, whose rate, age and losses are told from now on.
+        Return a new input, whose rate, age and losses are reported from now on.
 
         hold_last: its last value counts until the next one comes; that it does so without a source
         is reported.
@@ -154,7 +154,7 @@ class TellingNode(Node):
         self.keep(_loss_of(name), '')
 
     def look(self) -> None:
-        """Look at the inputs before their health is told."""
+        """Look at the inputs before their health is reported."""
 
     def tell_health(self) -> None:
         """Tell of the node and its inputs."""

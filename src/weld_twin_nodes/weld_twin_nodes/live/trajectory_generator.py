@@ -159,7 +159,7 @@ class Pump:
     stamps: header stamps, increasing, shape (N,) [ns].
     playback: run speed against the stamps; 0 is as fast as the listeners keep up.
     window: how many samples may be under way that nobody has answered yet.
-    answered: whether answers will be told at all; without them the window is not kept.
+    answered: whether answers are wanted at all; without them the window is not kept.
     """
 
     def __init__(
@@ -215,7 +215,7 @@ BURST = 50
 """Samples sent at one look; well below the depth of the listeners' queues."""
 
 SHOWN = 500
-"""Points of the motion as it is told to planners and pictures."""
+"""Points of the motion as it is published for planners and pictures."""
 ACKNOWLEDGED = 3.0
 """Seconds to wait for the subscribers' middleware to have received everything."""
 
@@ -347,7 +347,7 @@ class TrajectoryGenerator(CellNode):
 
     def _begin_in_time(self) -> None:
         start = self.setting('start_stamp_ns') or self.get_clock().now().nanoseconds
-        if start == 0:  # simulated time that nobody has told yet
+        if start == 0:  # simulated time that nobody has published yet
             return
         self._timer.cancel()
         self._stamp(start)

@@ -54,7 +54,7 @@ class Heard(NamedTuple):
 
 
 class Word(NamedTuple):
-    """What a node told at a time."""
+    """What a node said at a time."""
 
     node: str
     run: str
@@ -110,15 +110,15 @@ class Book:
         return (words[-1] for words in self._words.values())
 
     def latest(self) -> list[Word]:
-        """Return the last word of every node, whichever of its starts told it."""
+        """Return the last word of every node, whichever of its starts said it."""
         return [*{each.node: each for each in sorted(self.last(), key=lambda w: w.at)}.values()]
 
     def nodes(self, since: float = 0.0) -> set[str]:
-        """Return the nodes that have told of themselves since a time [s]."""
+        """Return the nodes that have reported since a time [s]."""
         return {each.node for each in self.last() if each.at >= since}
 
     def tellers(self, topic: str) -> set[str]:
-        """Return the nodes that told of messages they sent on a topic."""
+        """Return the nodes that said they sent messages on a topic."""
         return {each.node for each in self.last() if topic in each.sent}
 
     def twice(self, node: str, now: float) -> bool:
@@ -131,7 +131,7 @@ class Book:
         )
 
     def sent(self, topic: str) -> Sent | None:
-        """Return what was sent on a topic by all who told, None if nobody did."""
+        """Return what was sent on a topic by all who said so, None if nobody did."""
         rows = [each.sent[topic] for each in self.last() if topic in each.sent]
         if not rows:
             return None
@@ -196,7 +196,7 @@ class NeighbourHealth:
         self._hearers.remove(hearer)
 
     def alive(self) -> set[str]:
-        """Return the nodes that have told of themselves just now, also where none is served."""
+        """Return the nodes that have reported just now, also where none is served."""
         handle = self._subscription.handle
         with handle:
             while (taken := handle.take_message(self._subscription.msg_type, True)) is not None:

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A robot program corrected by a model file: what is read, what is changed, what is told.
+A robot program corrected by a model file: what is read, what is changed, what is reported.
 
 Whether it keeps a tolerance all along, and the model as a running node corrects goals with it.
 """
@@ -77,13 +77,13 @@ class CorrectedProgram:
 
     program: Program
     texts: tuple[str, ...]  # one for every file of the program
-    found: ProgramCorrection
+    correction: ProgramCorrection
     notes: tuple[str, ...]  # what a reader should know, in sentences
 
     @property
     def accuracy(self) -> tuple[Accuracy | None, Accuracy | None]:
         """Return the expected accuracy before and after."""
-        return along_seams(self.found)
+        return along_seams(self.correction)
 
 
 def program_model(
@@ -231,8 +231,8 @@ def _has_tool(context: Context, tool: Any) -> bool:
 def move_rows(made: CorrectedProgram) -> list[dict[str, Any]]:
     """Return for every move, in the order of the program, what happened to where it leads."""
     rows = []
-    moves = [move for piece in made.found.program.pieces for move in piece]
-    for step, move, got in zip(made.program.steps, moves, made.found.results, strict=True):
+    moves = [move for piece in made.correction.program.pieces for move in piece]
+    for step, move, got in zip(made.program.steps, moves, made.correction.results, strict=True):
         point = None if move.end is None else made.program.points[move.end.point]
         rows.append(
             {
@@ -241,7 +241,7 @@ def move_rows(made: CorrectedProgram) -> list[dict[str, Any]]:
                 'point': None if point is None else point.name,
                 'declared': None if point is None else point.where,
                 'seam': move.seam,
-                'corrected': move.seam not in made.found.left,
+                'corrected': move.seam not in made.correction.left,
                 'moved_m': got.length,
                 'turned_rad': got.turn,
                 'before_m': got.before,
@@ -265,7 +265,7 @@ def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[s
         'max_correction': {'length_m': caps.length, 'turn_rad': caps.turn},
         'expected': {'before': _accuracy(before), 'after': _accuracy(after)},
         'moves': move_rows(made),
-        'left': [{'seam': seam, 'why': why} for seam, why in sorted(made.found.left.items())],
+        'left': [{'seam': seam, 'why': why} for seam, why in sorted(made.correction.left.items())],
         'notes': list(made.notes),
     }
 
@@ -284,19 +284,19 @@ def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
     """
     out = []
     seams = any(
-        move.kind != 'joint' and move.seam not in made.found.left
-        for piece in made.found.travel.pieces
+        move.kind != 'joint' and move.seam not in made.correction.left
+        for piece in made.correction.travel.pieces
         for move in piece.moves
     )
-    for piece in made.found.travel.pieces:
-        motion = repeated(model.robot, made.found.program, piece)
+    for piece in made.correction.travel.pieces:
+        motion = repeated(model.robot, made.correction.program, piece)
         meant, commanded = model.wanted(piece), model.wanted(piece._replace(motion=motion))
         for k, move in enumerate(piece.moves):
             chosen = piece.move == k
             if not seams:
                 chosen = np.zeros(chosen.size, dtype=bool)
                 chosen[piece.ends[k]] = True
-            if move.seam in made.found.left or (seams and move.kind == 'joint'):
+            if move.seam in made.correction.left or (seams and move.kind == 'joint'):
                 continue
             poses = {'meant': _six(meant[chosen]), 'commanded': _six(commanded[chosen])}
             out.append({'tool': move.tool.tolist(), **poses})
@@ -360,9 +360,9 @@ def _postures_more(
 ) -> int | None:
     """Return how many postures measured along the program make it sure; None where none do."""
     assert model.posterior is not None
-    q = np.concatenate([piece.motion.q for piece in made.found.travel.pieces])
+    q = np.concatenate([piece.motion.q for piece in made.correction.travel.pieces])
     postures = q[np.unique(np.linspace(0, len(q) - 1, min(OFFERED, len(q))).round().astype(int))]
-    twin = model.twin(made.found.travel.pieces[0].moves[0].tool)
+    twin = model.twin(made.correction.travel.pieces[0].moves[0].tool)
     count = min(MORE[-1], len(postures))
     wanted = Wanted(tolerance, noise)
     stations = plan_more(model.posterior, twin, (postures, postures), count, wanted).q
@@ -374,15 +374,15 @@ def _postures_more(
         surer = replace(
             model, posterior=model.posterior.after(Features(twin, still, t), noise), _twins={}
         )
-        drawn = tuple(surer.drawn(piece, piece.motion) for piece in made.found.travel.pieces)
-        _, after = along_seams(replace(made.found, drawn=drawn))
+        drawn = tuple(surer.drawn(piece, piece.motion) for piece in made.correction.travel.pieces)
+        _, after = along_seams(replace(made.correction, drawn=drawn))
         if after is not None and (after.within(tolerance) or 0.0) >= SURE:
             return number
     return None
 
 
 DIGITS = 12
-"""Of the hash of a file, as it is told: enough for all models of a plant."""
+"""Of the hash of a file, as it is reported: enough for all models of a plant."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ def where_it_holds(posterior: Posterior) -> list[str]:
         if anywhere != recorded
         else f'The whole model is known to {recorded} (one standard deviation); {_BESIDES}.'
     ]
-    out += left_open(posterior)
+    out += undetermined(posterior)
     return [*out, 'Measured at ' + '; '.join(posterior.domain.sentences()) + '.']
 
 
@@ -56,8 +56,8 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
     """
     Return that what is said holds where it was measured, in a sentence, and how wide it is beyond.
 
-    How far it is off where it was measured is what is left of the gap, which is told as that. What
-    is told of elsewhere is of the ``corrected`` robot, and of no other.
+    How far it is off where it was measured is what is left of the gap, reported as such. What
+    is promised elsewhere holds for the ``corrected`` robot, and for no other.
     """
     if not corrected:
         return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
@@ -120,7 +120,7 @@ def _mm(length: float) -> str:
     return f'{length * 1e3:.3f} mm'
 
 
-def left_open(posterior: Posterior) -> list[str]:
+def undetermined(posterior: Posterior) -> list[str]:
     """Return the directions that the recordings left open, in one sentence or none."""
     if not posterior.left_open:
         return []
@@ -153,7 +153,7 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
     Write how much further each joint really stands than its reading: rad and deg, or m and mm.
 
-    Only zeros that are named are told to be set: others that a model has beside them may stand
+    Only zeros that are named are to be set: others that a model has beside them may stand
     against its springs and lengths, and do harm without them.
 
     A table is read by spreadsheets; where the model holds stands in the other files.

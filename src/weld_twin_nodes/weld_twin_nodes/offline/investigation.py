@@ -102,7 +102,7 @@ def closes(result: Mapping[str, Any]) -> str:
 
 def is_sure(verdict: Mapping[str, Any]) -> bool:
     """
-    Return whether an answer is told as sure.
+    Return whether an answer is reported as sure.
 
     ``verdict``: of diagnosis.json, of either schema.
     """
@@ -293,7 +293,7 @@ def take_in(
     result: Mapping[str, Any],  # the content of diagnosis.json
     # Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
     why: str | None = None,
-    # What was changed in the cell for the new recordings; every later diagnosis is told.
+    # What was changed in the cell for the new recordings; every later diagnosis needs it.
     changes: str = '',
 ) -> State:
     """Return the state after a diagnosis of all recordings so far."""

@@ -143,7 +143,7 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
     """
     Do what the note of a scratch directory says, as far as it is not done; nothing without a note.
 
-    ``kept``: told every file that was not ours: its name, and the name that it has now.
+    ``kept``: called with every file that was not ours: its name, and the name that it has now.
     """
     try:
         change = _decided(scratch / NOTE)
@@ -288,7 +288,7 @@ def new_directory(
     adds: bool = False,  # files of the same result that are not made again stay, too
     # The folder may be anybody's; left out, one that holds other things alone is refused.
     shared: bool = False,
-    tell: Callable[[str], None] = on_stderr,  # told which files got another name
+    tell: Callable[[str], None] = on_stderr,  # called with which files got another name
 ) -> Iterator[Path]:
     """
     Yield a hidden directory whose files come to ``path`` when the block succeeds.

@@ -55,7 +55,7 @@ BESIDE = 'prediction.json'
 
 
 MOST = 3
-"""Stretches told on the terminal; the others are in the file."""
+"""Segments listed on the terminal; the others are in the file."""
 
 
 class Segment(NamedTuple):

@@ -26,7 +26,7 @@ from weld_twin_msgs_py.programs.languages import language_of
 from weld_twin_msgs_py.programs.source import read_source
 
 POSTURES = 160
-"""Postures of a region, a third of which judge it; more change what is told by some per cent."""
+"""Postures of a region, a third of which judge it; more change the result by some per cent."""
 TRIED = 400
 """Places tried in a box, of which those count that the arm reaches."""
 FEWEST = 8

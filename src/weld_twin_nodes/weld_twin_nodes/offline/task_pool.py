@@ -33,7 +33,7 @@ from .environment import THREADS, environment
 Plain = Any
 """What JSON can hold."""
 Tell = Callable[[int, int, str], None]
-"""Told how many tasks are done, how many there are, and what the last was."""
+"""Called with how many tasks are done, how many there are, and what the last was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Runner:
     Runs tasks on a pool and keeps their results; closes the pool when its block ends.
 
     store: directory of results; a task whose result is there already is not run again.
-    tell: told about progress.
+    tell: called after every task.
     """
 
     def __init__(self, pool: Pool, store: Path | None = None, tell: Tell | None = None) -> None:

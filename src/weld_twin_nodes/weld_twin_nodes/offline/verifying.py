@@ -6,7 +6,7 @@ Was a promise kept? What was measured after a correction beside what was expecte
 After a program was corrected, the tool is measured against where the program meant it: where the
 controller believes it to be, less what the correction moved the points by there. After the robot
 itself was mended, it is measured against the nominal arm, which it should then be. Either way what
-is left is held against what each cause does on this motion: a cause that is still there shows with
+is left is compared with what each cause does on this motion: a cause that is still there shows with
 its own size, one that went away with none, one that was entered the wrong way round with twice.
 """
 
@@ -45,7 +45,7 @@ OPEN = 0.25
 WIDE = 1.0
 """Spread of such a share before the recording, about one half: anything from away to twice."""
 ALONE = 8
-"""Causes told one by one at most; of more the kinds are told, as pages have them."""
+"""Causes listed one by one at most; of more the kinds are listed, as pages have them."""
 ROUNDS = 3
 """Times that frames are fitted anew; each leaves a thousandth of what the one before left."""
 LEVER = 0.1
@@ -67,7 +67,7 @@ ASIDE = 1.5
 
 
 class Promise(NamedTuple):
-    """An RMS that was promised and the interval it was to lie in [m]; None where none was told."""
+    """An RMS that was promised and the interval it was to lie in [m]; None where there was none."""
 
     rms: float
     low: float | None
@@ -96,7 +96,7 @@ class Measured(NamedTuple):
         )
 
 
-class Left(NamedTuple):
+class RemainingCause(NamedTuple):
     """What is left of a cause."""
 
     sites: tuple[Site, ...]  # one, or all of a kind
@@ -125,7 +125,7 @@ class Verification:
     measured: Measured  # over the samples that count
     samples: int
     kept: bool
-    causes: tuple[Left, ...]  # what moves the tool most first
+    causes: tuple[RemainingCause, ...]  # what moves the tool most first
     off: Array  # size of what is left at every sample that counts, shape (M,) [m]
     program: str = ''  # name of the program; empty where the robot was mended
     notes: tuple[str, ...] = ()
@@ -238,7 +238,9 @@ class _Offs(NamedTuple):
     shares: Array
     normal: Array
 
-    def causes(self, units: Sequence[tuple[Site, ...]], share: float) -> tuple[Left, ...]:
+    def causes(
+        self, units: Sequence[tuple[Site, ...]], share: float
+    ) -> tuple[RemainingCause, ...]:
         """Return what is left of every cause, what moves the tool most first."""
         count = max(share * self.left.size - len(units), 1.0)
         sigma = max(float(np.sqrt((self.left**2).sum() / self.left.size)), 1e-9)
@@ -246,7 +248,7 @@ class _Offs(NamedTuple):
         spread = np.sqrt(np.diag(np.linalg.inv(self.normal / scale + np.eye(len(self.normal)))))
         sizes = np.sqrt((self.columns**2).sum(axis=2).mean(axis=1))
         out = [
-            Left(sites, float(self.shares[k]), float(spread[k]), float(sizes[k]))
+            RemainingCause(sites, float(self.shares[k]), float(spread[k]), float(sizes[k]))
             for k, sites in enumerate(units)
         ]
         return tuple(sorted(out, key=lambda cause: -cause.rms_m))

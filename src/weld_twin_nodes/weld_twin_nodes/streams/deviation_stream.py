@@ -153,7 +153,7 @@ def _through(support: list[tuple[int, Array]], stamp: int) -> Array:
 METRICS = 'deviation'
 """Name of the status that carries the metrics."""
 RECENT = 50
-"""Deviations whose median is held against what is plausible: single outliers are none of it."""
+"""Deviations whose median is compared with what is plausible: single outliers are none of it."""
 
 
 class Deviation(NamedTuple):
@@ -237,7 +237,7 @@ class Deviations:
         return self._each(pairs)
 
     def clocks(self) -> str:
-        """Return what is to be told of the two clocks, empty where nothing is."""
+        """Return what to report about the two clocks, empty where nothing is."""
         return self._clocks.look(
             time.monotonic(), self._metrics.samples, self._pairing.waiting, self._pairing.dropped
         )

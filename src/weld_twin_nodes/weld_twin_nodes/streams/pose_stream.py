@@ -78,7 +78,7 @@ class PoseStream:
     first pose is followed, and faded in or out where the stream stands still, at no other time.
 
     passing: what is refused passes as it came; else nothing is sent.
-    shadow: nothing is sent; what would be added is told.
+    shadow: nothing is sent; what would be added is reported.
     beside: makes exact looks meanwhile; left out, and until it is up, the stream makes them itself
     after a pose.
     """

@@ -4,7 +4,7 @@
 What the stamps of streams tell: messages that are missing, a clock that jumped, a new run, two clocks.
 
 A middleware that drops a message says nothing of it. A publisher of somebody else tells no counts
-either, but what has a beat has stamps on that beat, and a gap between two of them is told here.
+either, but what has a beat has stamps on that beat, and a gap between two of them is reported here.
 
 Of two clocks, offsets of a second and more show in the stamps that arrive together. Smaller ones hide
 behind the time a message takes on its way; they show in the motion: the measured way is that of the
@@ -26,7 +26,7 @@ NANOSECOND = 1e-9
 ALIVE = 1.5
 """Seconds within which a stream must have brought something to be compared."""
 UNPAIRED = 2.0
-"""Seconds without a pair after which it is told that nothing pairs."""
+"""Seconds without a pair after which it is reported that nothing pairs."""
 APART = 0.5
 """Difference [s] of stamps that arrive together that no way of a message explains."""
 PACE = (0.7, 1.4)
@@ -46,15 +46,15 @@ TWIN_EVERY, MEASURED_EVERY = 0.004, 0.02
 BLURRED = 3e-4
 """Deviation [m] below which no shift is looked for: it is the size of the gaps of good arms."""
 EXPLAINED = 0.25
-"""Share of the squared deviation that a shift may leave, to be told."""
+"""Share of the squared deviation that a shift may leave, to be reported."""
 SHIFTED = 0.012
-"""Smallest shift [s] that is told: servo loops trail by less."""
+"""Smallest shift [s] that is reported: servo loops trail by less."""
 STEADY = 0.01
 """Seconds within which two looks in a row must agree."""
 DRIFT_SPAN = 20.0
 """Seconds over which a drift is judged."""
 DRIFTED = 0.004
-"""Smallest change [s] that is told as a drift."""
+"""Smallest change [s] that is reported as a drift."""
 
 
 class Sample(NamedTuple):
@@ -126,7 +126,7 @@ class ClockWatch:
 
     def look(self, now: float, paired: int, waiting: int, dropped: int) -> str:
         """
-        Return what is to be told of the clocks, empty where nothing is.
+        Return what to report about the clocks, empty where nothing is.
 
         now: [s]
         paired, waiting, dropped: measurements so far that met the twin, that wait for it, and that
@@ -176,7 +176,7 @@ class ClockWatch:
         return offset_words(result, 3) + trailing
 
     def _drift(self) -> str:
-        """Return what is to be told of a shift that grows with time."""
+        """Return what to report about a shift that grows with time."""
         if not self._history or self._history[-1][0] - self._history[0][0] < DRIFT_SPAN:
             return ''
         t, offset = np.array(self._history).T

@@ -13,9 +13,9 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 COUNT = 20
-"""Deviations that are held against what the model promises: as many as its change may go unnoticed."""
+"""Deviations that are compared with what the model promises: as many as its change may go unnoticed."""
 GROUPS = 40
-"""Groups of so many deviations whose mean is held against what the model leaves beside the noise."""
+"""Groups of so many deviations whose mean is compared with what the model leaves beside the noise."""
 ABOVE = 2.0
 """Times what a model promises on unseen data from which on it does not hold: noise of twenty
 measurements, three coordinates each, stays within 1.3 times in 999 of 1,000 cases."""
@@ -47,7 +47,7 @@ class Promise(NamedTuple):
 
         remaining: RMS distance of measurements from the model [m].
         unsure: standard deviation, in its worst direction, of what the model is not sure of [m].
-        samples: measurements that told both. What hides in their noise, within two standard errors
+        samples: measurements behind both. What hides in their noise, within two standard errors
         of its square, may be the model's.
         """
         hidden = 2.0 * remaining**2 * sqrt(2.0 / (3.0 * samples))

@@ -26,12 +26,12 @@ from .words import (
 )
 
 _GROWS = 1.02
-"""Ratio of the largest deviation after to before from which it is told as grown: less than that is
+"""Ratio of the largest deviation after to before from which it is reported as grown: less than that is
 a matter of which sample has the largest noise."""
 _APART = 0.02
-"""Share of the squared gap by which a curve may fall short of its place before both are told."""
+"""Share of the squared gap by which a curve may fall short of its place before both are reported."""
 _EVERY = 3
-"""Switches of which every combination is told; of more, each alone and all together."""
+"""Switches of which every combination is reported; of more, each alone and all together."""
 _LOOK = {
     'constant': 'zeros and frames',
     'angle': 'gear and encoder',
@@ -48,7 +48,7 @@ _CLOCKS = 'clocks'
 """Name of the check of the clocks: what is late by a clock grows with the speed, as a lag does."""
 
 
-class Left(NamedTuple):
+class Remaining(NamedTuple):
     """RMS and largest deviation [m], as it is and with one cause mended."""
 
     rms: float
@@ -67,19 +67,19 @@ class Left(NamedTuple):
         return self.rms_after > (1.0 + UNCHANGED) * self.rms
 
 
-_KEPT: WeakKeyDictionary[Diagnosis, dict[tuple[int, ...], Left]] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[Diagnosis, dict[tuple[int, ...], Remaining]] = WeakKeyDictionary()
 """What was asked for, by diagnosis and by the switches thrown."""
 
 
-def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
+def remaining_without(diagnosis: Diagnosis, k: int) -> Remaining | None:
     """Return what is left with cause ``k`` alone mended; None where it cannot be thought away."""
     for at, switch in enumerate(switches(diagnosis)):
         if switch.members == (k,):
-            return left_with(diagnosis, (at,))
+            return remaining_with(diagnosis, (at,))
     return None
 
 
-def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
+def remaining_with(diagnosis: Diagnosis, mended: Collection[int]) -> Remaining:
     """
     Return what is left with some of the `switches` thrown, counted from 0.
 
@@ -93,7 +93,7 @@ def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
     return kept[key]
 
 
-def _worked_out(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
+def _worked_out(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Remaining:
     runs: list[tuple[np.ndarray, np.ndarray]] = []
     for run, (remaining, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
         good = trusted(diagnosis, run)
@@ -105,14 +105,14 @@ def _worked_out(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
     (rms, largest), (rms_after, largest_after) = (
         (float(np.sqrt((s**2).mean())) if s.size else 0.0, float(s.max(initial=0.0))) for s in both
     )
-    return Left(rms, rms_after, largest, largest_after)
+    return Remaining(rms, rms_after, largest, largest_after)
 
 
 def _sizes(vectors: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
-def thought_mended(diagnosis: Diagnosis) -> list[tuple[int, ...]]:
+def switch_sets(diagnosis: Diagnosis) -> list[tuple[int, ...]]:
     """Return which switches are thrown together where the page says what is left: none first."""
     count = len(switches(diagnosis))
     sizes = range(count + 1) if count <= _EVERY else (0, 1, count)
@@ -140,7 +140,7 @@ def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
     None where the cause has a name, or where its curve takes off what its place holds.
     """
     cause = diagnosis.causes[k]
-    remaining = left_without(diagnosis, k) if unnamed(cause) else None
+    remaining = remaining_without(diagnosis, k) if unnamed(cause) else None
     if remaining is None:
         return None
     taken = max(1.0 - (remaining.rms_after / max(remaining.rms, 1e-300)) ** 2, 0.0)
@@ -150,7 +150,7 @@ def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
 
 def warning(diagnosis: Diagnosis, k: int) -> str:
     """Return that mending a cause makes the worst spot of the seam worse; nothing where not."""
-    remaining = left_without(diagnosis, k)
+    remaining = remaining_without(diagnosis, k)
     if remaining is None or not (remaining.grows or remaining.rises):
         return ''
     reported = (
@@ -170,7 +170,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     where = likely(cause.place) or 'the whole cell'
     first = f'Look at {where}: {_no_effect(diagnosis)} gives what is found there.'
     if cause.dependence:
-        # Where two fit alike, both are told: the first alone would send a fitter to the wrong part.
+        # Where two fit alike, both are named: the first alone would send a fitter to the wrong part.
         on = [name for name, _ in leading(cause.dependence)]
         at = [_LOOK.get(name, 'all that moves') for name in on]
         at += ['the clocks'] * ('speed' in on and not _one_clock(diagnosis))
@@ -178,7 +178,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
             f'Look at {where}, first at {"; then at ".join(dict.fromkeys(at))}: what is found there '
             f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
         )
-    remaining = left_without(diagnosis, k)
+    remaining = remaining_without(diagnosis, k)
     if remaining is None:
         return [first]
     if remaining.grows or remaining.rises:
@@ -216,7 +216,7 @@ def _no_effect(diagnosis: Diagnosis) -> str:
 
 def curve_fault(diagnosis: Diagnosis, k: int) -> str:
     """Return why programs are not to be corrected by the curve of a cause; nothing where they can."""
-    remaining = left_without(diagnosis, k)
+    remaining = remaining_without(diagnosis, k)
     if remaining is None or not unnamed(diagnosis.causes[k]):
         return ''
     if remaining.grows:
@@ -232,5 +232,5 @@ def _one_clock(diagnosis: Diagnosis) -> bool:
     return bool(levels) and set(levels) == {'ok'}
 
 
-def _both(remaining: Left) -> str:
+def _both(remaining: Remaining) -> str:
     return f'{millimetres(remaining.largest)} to {millimetres(remaining.largest_after)}'

@@ -17,7 +17,7 @@ from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 DEGREES = 180.0 / pi
 """Degrees in a radian."""
 _PULL = 100.0
-"""Torque [N m] that a yielding is told under: what an arm's own links load a joint with."""
+"""Torque [N m] under which a yielding is reported: what an arm's own links load a joint with."""
 _BY_UNIT = {
     'm': (1e3, 'mm'),
     'rad': (1e3, 'mrad'),
@@ -125,13 +125,13 @@ def change(shrink: float) -> str:
     return f'{percent(abs(shrink))} {"less" if shrink > 0.0 else "more"}'
 
 
-def left_of(shrink: Shrink) -> tuple[str, str]:
+def shrink_ratio(shrink: Shrink) -> tuple[str, str]:
     """Return the ratio of after to before, and how sure it is."""
     value, ends = with_ends(shrink.ratio, *shrink.ci95)
     return value, f'95{_GAP}% interval {ends}'
 
 
-def left_elsewhere(shrink: Shrink) -> str:
+def shrink_elsewhere(shrink: Shrink) -> str:
     """Return how much of the gap is left where nothing was recorded, in a sentence."""
     if shrink.elsewhere_ci95 is None:
         return ''
@@ -178,7 +178,7 @@ def in_short(value: float, std: float | None, factor: float = 1.0, unit: str = '
     """
     Return '0.0287 ± 0.0003°': three digits of the value, as actions have it.
 
-    The error is told to the same place, and never as nothing.
+    The error is rounded to the same place, and never as nothing.
     """
     value = factor * value
     tail = unit if unit.startswith('°') else f' {unit}' if unit else ''

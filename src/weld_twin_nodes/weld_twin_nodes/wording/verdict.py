@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
-from .mending import advised, left_with
+from .mending import advised, remaining_with
 from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
 from .switches import switches
 from .words import (
@@ -18,7 +18,7 @@ from .words import (
     carries_curves,
     cause,
     cause_words,
-    found_name,
+    effect_name,
     in_words,
     likely,
     listed,
@@ -71,7 +71,7 @@ def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
 
 def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
-    names = [found_name(result) for result in diagnosis.effects]
+    names = [effect_name(result) for result in diagnosis.effects]
     sure = odds(diagnosis.confidence)
     if diagnosis.families:
         kinds = [
@@ -110,7 +110,7 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
     unsure = open_sites(diagnosis)
     sure = [result for result in diagnosis.effects if site_of(result) not in unsure]
-    settled = listed([f'{found_name(result)}{_twins(diagnosis, result)}' for result in sure])
+    settled = listed([f'{effect_name(result)}{_twins(diagnosis, result)}' for result in sure])
     if not choices:
         return f'The {size} comes from {settled}.', _gain(diagnosis)
     after = _gain(diagnosis, 'Either way')
@@ -147,7 +147,7 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
         return _placed(diagnosis)
     size, remaining = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
     if diagnosis.effects:
-        names = listed([found_name(result) for result in diagnosis.effects[:_NAMED]])
+        names = listed([effect_name(result) for result in diagnosis.effects[:_NAMED]])
         first = f'Part of the gap of {size} comes from {names}'
         if diagnosis.reasons and not diagnosis.unexplained.above_noise:
             # The model takes all of it up, but by names that are rather wrong than right.
@@ -193,7 +193,7 @@ def _instead(diagnosis: Diagnosis) -> str:
     if taken and len(taken) < len(every):
         where = [likely(diagnosis.causes[every[at].members[0]].place) for at in taken]
         reported = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
-        remaining = left_with(diagnosis, taken)
+        remaining = remaining_with(diagnosis, taken)
         before, after = millimetres(remaining.rms), millimetres(remaining.rms_after)
         return f'Programs corrected by {reported}, {before} shrinks to {after}'
     shrink = diagnosis.shrink

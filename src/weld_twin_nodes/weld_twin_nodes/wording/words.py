@@ -34,7 +34,7 @@ STATUS = {
     'unsound': 'Unsound data',
 }
 PARTLY = 'Partly identified'
-"""Where causes are told, and it is likelier than not that one more acts or one of them does not."""
+"""Where causes are reported, and it is likelier than not that one more acts or one of them does not."""
 REGIMES = {
     'static': 'constant or by angle',
     'reversal': 'at reversals',
@@ -85,7 +85,7 @@ def called(effect: str) -> str:
     return (kind.traits.title if kind else '') or effect.replace('_', ' ')
 
 
-def found_name(result: Found) -> str:
+def effect_name(result: Found) -> str:
     """Return a found effect as people say it."""
     return cause(result.effect.name, result.effect.site)
 

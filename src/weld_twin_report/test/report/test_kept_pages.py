@@ -26,7 +26,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Candidate, Check, Found, Shares, Site
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion
-from weld_twin_nodes.wording.mending import left_without
+from weld_twin_nodes.wording.mending import remaining_without
 from weld_twin_report.report import print_summary, report_page, sections
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 from weld_twin_report.report.diagnosis_page import Sheet
@@ -120,7 +120,7 @@ def open_and_sure():
 def allowing(factor):
     """Return what is open beside what is sure, and a tolerance of so much of what the sure leaves."""
     case = open_and_sure()
-    left = factor * left_without(case, 1).largest_after
+    left = factor * remaining_without(case, 1).largest_after
     return case, Sheet(Demand(left, 1e-6))
 
 

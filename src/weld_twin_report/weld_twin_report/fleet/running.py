@@ -84,7 +84,7 @@ class Listed:
         """
         Return what tells this request from any other, content of its files included.
 
-        A file that is not there is told by its name: once it is there, it is another request.
+        A file that is not there counts by its name: once it is there, it is another request.
         """
         files = [self.recording, self.robot, self.effects_known, self.contacts]
         reported = [_content(name) for name in files]
@@ -168,7 +168,7 @@ BATCH = 256
 THERE = 'there already'
 """Counted apart: what was written before, or stands in the list twice."""
 Tell = Callable[[int, int, Run | None], None]
-"""Told how many recordings are done, how many there are, and what the last one came to."""
+"""Called with how many recordings are done, how many there are, and what the last one came to."""
 
 
 def run_fleet(

@@ -54,7 +54,7 @@ class Outcome:
     """How a command ended."""
 
     code: int  # its exit code; 2 is a refusal in a sentence, 1 and -1 are failures
-    said: str  # the last line that it told
+    said: str  # the last line that it printed
     seconds: float  # it took in all
     memory: int = 0  # bytes it needed at most
 
@@ -84,7 +84,7 @@ class Guarded:
     def run(
         self,
         words: Sequence[object],  # the command's words
-        # Told every line that the command tells of its progress.
+        # Called with every line that the command prints about its progress.
         tell: Callable[[str], None] = lambda text: None,
         # Where it runs: paths relative to it keep the places of this machine out of results.
         folder: Path | None = None,

@@ -63,7 +63,7 @@ class Database:
     url: of SQLAlchemy (``postgresql+psycopg://...``), or the path of an SQLite file.
     make: whether an empty database, or a file that is not there, becomes a history.
     patience: seconds for which a write is tried again while the database cannot be used; a minute
-    unless told.
+    unless given.
 
     Raises DataError: SQLAlchemy is not installed, or the database cannot be opened or is no
     history.
@@ -192,8 +192,8 @@ class Database:
         self,
         work: Callable[[Connection], T],  # takes the connection
         *,
-        connecting: bool = False,  # whether a server that is not there is told at once
-        patience: float | None = None,  # seconds; that of the database unless told
+        connecting: bool = False,  # whether to report at once a server that is not there
+        patience: float | None = None,  # seconds; that of the database unless given
     ) -> T:
         """
         Do some work in one transaction, and return what it returns.

@@ -115,7 +115,7 @@ def bring_up(connection: Connection, tables: MetaData, version: int) -> None:
     """
     Make the tables, or bring those of an older version to this one.
 
-    ``connection``: in a transaction that writes. ``version``: what `version_of` told.
+    ``connection``: in a transaction that writes. ``version``: what `version_of` returned.
     """
     import sqlalchemy
 
@@ -167,7 +167,7 @@ def passes(error: Exception, *, connecting: bool = False) -> bool:
     Return whether an error of SQLAlchemy is likely to be gone with the next attempt.
 
     ``error``: of SQLAlchemy. ``connecting``: whether it comes from the first connection: a server
-    that is not there is then told at once.
+    that is not there is then reported at once.
     """
     from sqlalchemy.exc import DBAPIError, OperationalError
 

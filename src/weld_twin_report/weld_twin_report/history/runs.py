@@ -34,7 +34,7 @@ class Run:
     cell: str
     recording: str
     state: str  # 'done', 'unsound', 'refused' or 'failed'
-    sentence: str  # what was told last: the verdict's status, or why there is none
+    sentence: str  # what was reported last: the verdict's status, or why there is none
     seconds: float
     memory: int  # bytes it needed at most
 
@@ -49,7 +49,7 @@ class Runs:
         """
         Write how a recording went, and its diagnosis, in one transaction.
 
-        patience: seconds for which it is tried again; that of the database unless told.
+        patience: seconds for which it is tried again; that of the database unless given.
 
         Raises Unavailable: the database cannot be used now. Nothing was written; it may be tried
         again.
@@ -117,7 +117,7 @@ class Runs:
         """
         Return of every cell its newest diagnosis, how many it has, and what changed on it.
 
-        Of a cell whose rows are damaged, ``name`` and ``damaged``, a sentence, are all that is told.
+        Of a cell whose rows are damaged, ``name`` and ``damaged``, a sentence, are all there is.
         """
         try:
             return self._newest()

@@ -59,7 +59,7 @@ def named(entries: Sequence[Entry]) -> set[str]:
 
 
 def likely(entries: Sequence[Entry]) -> set[str]:
-    """Return the coordinates that use can change; those of the tool are told by axis."""
+    """Return the coordinates that use can change; those of the tool by axis."""
     in_use = {'tool', *(name for name, effect in REGISTRY.items() if effect.traits.changes_in_use)}
     names = {name for entry in entries for name in entry.names}
     return {name for name in names if name.replace('.', ' ').split(' ')[0] in in_use}

@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.errors import TwinError
 from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
 from weld_twin_core.metrics.performance import Performance, performance_of
-from weld_twin_nodes.wording.mending import advised, left_with, thought_mended
+from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets
 from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.switches import switches, trusted
 from weld_twin_nodes.wording.words import listed, unnamed
@@ -48,7 +48,7 @@ def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:
 
 def largest(diagnosis: Diagnosis) -> float:
     """Return the largest deviation as it is [m]."""
-    return left_with(diagnosis, ()).largest
+    return remaining_with(diagnosis, ()).largest
 
 
 def on_what(diagnosis: Diagnosis) -> str:
@@ -85,9 +85,9 @@ def most_data(diagnosis: Diagnosis) -> dict[str, float]:
     every = range(len(switches(diagnosis)))
     return {
         ''.join(str(int(k in mended)) for k in every): round(
-            1e3 * left_with(diagnosis, mended).largest_after, 9
+            1e3 * remaining_with(diagnosis, mended).largest_after, 9
         )
-        for mended in thought_mended(diagnosis)
+        for mended in switch_sets(diagnosis)
     }
 
 
@@ -132,7 +132,7 @@ def _field(rule: Rule) -> Html:
 def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
     """Return a row for the robot as it is, and for each of the causes that may be mended."""
     if not switches(diagnosis):
-        remaining = left_with(diagnosis, ())
+        remaining = remaining_with(diagnosis, ())
         first = _row(f'as it is{_where(diagnosis)}', remaining.rms, remaining.largest, rule)
         if not diagnosis.effects:
             return [first]
@@ -141,8 +141,8 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
             _row('with what was found mended', remaining.rms_after, remaining.largest_after, rule),
         ]
     out, taken = [], set(advised(diagnosis))
-    for mended in thought_mended(diagnosis):
-        remaining = left_with(diagnosis, mended)
+    for mended in switch_sets(diagnosis):
+        remaining = remaining_with(diagnosis, mended)
         against = '' if set(mended) <= taken else ' (not advised)'
         reported = f'{_mended_words(diagnosis, mended)}{against}'
         out.append(_row(reported, remaining.rms_after, remaining.largest_after, rule))
@@ -163,7 +163,7 @@ def _mended_words(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
 def _more(diagnosis: Diagnosis) -> Html | None:
     """Return where the other combinations are, and what mended means without a name."""
     parts = []
-    if len(thought_mended(diagnosis)) < 2 ** len(switches(diagnosis)):
+    if len(switch_sets(diagnosis)) < 2 ** len(switches(diagnosis)):
         parts.append('Any other combination: tick it under "What if".')
     if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
         parts.append('Where a cause has no name, mended means: programs corrected by its curve.')

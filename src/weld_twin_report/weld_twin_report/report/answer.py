@@ -21,7 +21,7 @@ from weld_twin_core.diagnosis.result import NAMING, Candidate, Diagnosis, Family
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.exports import elsewhere, left_open, which_file
+from weld_twin_nodes.offline.exports import elsewhere, undetermined, which_file
 from weld_twin_nodes.wording.mending import correctable
 from weld_twin_nodes.wording.quantities import (
     change,
@@ -36,7 +36,7 @@ from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_nodes.wording.words import (
     called,
     cause,
-    found_name,
+    effect_name,
     listed,
     mended,
     open_sets,
@@ -49,9 +49,9 @@ from .page_data import places, remainder
 from .to_do import weighed, worth_doing
 
 _LARGEST = 3
-"""Joints of a kind told, those first that need it most."""
+"""Joints of a kind that are listed, those first that need it most."""
 _LINES = 3
-"""Orders of ripple told for each joint."""
+"""Orders of ripple listed for each joint."""
 
 
 class Ripple(NamedTuple):
@@ -118,11 +118,11 @@ _FIRST_REAL_STAMP = 10**18
 _WIDER = 2.0
 """Ratio of the error elsewhere in the reach to that where it was measured from which it is a warning."""
 _ALIKE = 1.5
-"""Ratio of probabilities below which two candidates are told as alike."""
+"""Ratio of probabilities below which two candidates are reported as alike."""
 _HARDLY = 1000.0
-"""Ratio of probabilities that is told at most."""
-_TOLD = 4
-"""Causes whose figures are told beside that of the whole."""
+"""Ratio of probabilities that is reported at most."""
+_LISTED = 4
+"""Causes whose figures are reported beside that of the whole."""
 _DIFFERS = 0.005
 """Probability by which a part is surer than the whole, so that both read differently."""
 
@@ -211,7 +211,7 @@ class Answer:
         return Holds(
             elsewhere(posterior, correctable(self.diagnosis)),
             which_file(self.diagnosis.model.alone),
-            rest := left_open(posterior),
+            rest := undetermined(posterior),
             bool(rest) or posterior.anywhere_m > _WIDER * posterior.recorded_m,
         )
 
@@ -224,7 +224,7 @@ class Answer:
         sure = [c.belief for c in self.causes if c.cause.name and c.belief is not None]
         if not sure or max(sure) < whole.confidence + _DIFFERS:
             return ''
-        reported = ', '.join(odds(p) for p in sure[:_TOLD])
+        reported = ', '.join(odds(p) for p in sure[:_LISTED])
         if len(sure) == 1:
             return f'. The cause alone, others or none beside it: {reported}'
         return f'. All at once is less likely than each alone: {reported}'
@@ -236,7 +236,7 @@ class Answer:
         return places(self.diagnosis)
 
     def percent(self, share: float) -> str:
-        """Return a share as all of this answer are told."""
+        """Return a share in the words that all shares of this answer have."""
         return percent(share, self._places)
 
     def share_of(self, reported: CauseAnswer) -> tuple[str, str]:
@@ -261,7 +261,7 @@ class Answer:
         rows = []
         for result in whole.effects:
             values = parameter_rows(result.effect, result.std, whole.model.robot)
-            names = [found_name(result), *[''] * len(values)]
+            names = [effect_name(result), *[''] * len(values)]
             rows += [[name, *row] for name, row in zip(names, values, strict=False)]
         heads = ('Effect', 'Parameter', 'Value ± standard error')
         return [Table('Effects found', heads, rows)] if rows else []

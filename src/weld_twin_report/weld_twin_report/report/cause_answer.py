@@ -15,11 +15,11 @@ from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_nodes.wording.mending import (
-    Left,
+    Remaining,
     against,
     curve_fault,
-    left_without,
     look_at,
+    remaining_without,
     taken_by_curve,
     warning,
 )
@@ -45,9 +45,9 @@ from .to_do import TOGETHER
 
 LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')
 _LISTED = 3
-"""Places, dependences or names told of a level."""
+"""Places, dependences or names listed for a level."""
 _ACTIONS = 4
-"""Effects of a cause whose remedies are told; effects.yaml has all."""
+"""Effects of a cause whose remedies are listed; effects.yaml has all."""
 _LATE = {'servo_lag', 'time_delay'}
 """Causes that read otherwise where the joints were commanded, not measured."""
 _SOURCE = 'source of the joints'
@@ -105,7 +105,7 @@ class CauseAnswer:
 
     @property
     def _should_it_be(self) -> str:
-        """Return which of those that fit alike the values and remedies are told of."""
+        """Return which of those that fit alike has its values and remedies listed."""
         return f'hould it be {cause(self.effects[0].name, self.effects[0].site)}:'
 
     # How sure it is.
@@ -115,7 +115,7 @@ class CauseAnswer:
         """
         Return how sure it is: its name, one of its names that fit alike, or its place.
 
-        Who believes the whole verdict believes each part of it: a part is never told as less sure.
+        Who believes the whole verdict believes each part of it: a part is never reported as less sure.
         None where nothing is believed of it.
         """
         if all(site.effect in CURVES for site, _ in self.cause.name):
@@ -242,9 +242,9 @@ class CauseAnswer:
         return f'{text} ({sides}).' if sides else f'{text}.', f' RMS {rms_words(parts[good])}.'
 
     @cached_property
-    def remaining(self) -> Left | None:
+    def remaining(self) -> Remaining | None:
         """Return what is left with it alone mended; None where it cannot be thought away."""
-        return left_without(self.diagnosis, self.k)
+        return remaining_without(self.diagnosis, self.k)
 
     @cached_property
     def mended(self) -> tuple[str, str] | None:

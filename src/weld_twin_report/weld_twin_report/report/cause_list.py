@@ -15,9 +15,9 @@ from weld_twin_nodes.wording.quantities import (
     MISSING,
     both_angles,
     counted,
-    left_elsewhere,
-    left_of,
     millimetres,
+    shrink_elsewhere,
+    shrink_ratio,
     turns_only,
 )
 from weld_twin_nodes.wording.switches import MOST, cause_name, switches
@@ -43,9 +43,9 @@ from .to_do import reason_and_joints, untried, warned
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""
 _APART = 0.03
-"""Share of the squared gap by which a cause moves the tool beyond its share, to be told."""
+"""Share of the squared gap by which a cause moves the tool beyond its share, to be reported."""
 _VALUES = 4
-"""Parameters told on a card; effects.yaml has all."""
+"""Parameters listed on a card; effects.yaml has all."""
 _EFFECT = ('Effect on the seam', 'Effect at the stations')
 """What a cause does, along a motion and at stations at rest."""
 
@@ -441,13 +441,13 @@ def _judged(diagnosis: Diagnosis) -> str:
     if shrink.orientation_rad is not None and turns_only(diagnosis):
         before, after = map(both_angles, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
-    value, interval = left_of(shrink)
+    value, interval = shrink_ratio(shrink)
     remaining = f'{value} of the RMS gap is left ({interval})'
     if not _apart(diagnosis):
-        return f'Judged on stretches left out in turn, {remaining}.{left_elsewhere(shrink)}'
+        return f'Judged on stretches left out in turn, {remaining}.{shrink_elsewhere(shrink)}'
     return (
         f'On {shrink.held_out}, which was not fitted, {millimetres(shrink.rms_before_m)} shrinks '
-        f'to {millimetres(shrink.rms_after_m)}: {remaining}.{left_elsewhere(shrink)}'
+        f'to {millimetres(shrink.rms_after_m)}: {remaining}.{shrink_elsewhere(shrink)}'
     )
 
 

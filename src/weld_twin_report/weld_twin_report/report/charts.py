@@ -124,7 +124,7 @@ def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
 _SAMPLES = 60
 """Points of a drawn curve: one for every four units of its width."""
 _FLAT = 0.05
-"""Part of a curve's size within which it is told as the same everywhere."""
+"""Part of a curve's size within which it is reported as the same everywhere."""
 _NINETY = 1.645
 """Standard deviations to either side that hold 90 % of a Gaussian."""
 _DEGREES = 180.0 / np.pi
@@ -244,7 +244,7 @@ def _sampled(curve: JointCurve) -> tuple[Array, Array, Array]:
 _SHARES = ('scale', 'ratio', 'difference')
 """Parameters of joints that are a share of an angle."""
 _QUARTER = 90.0
-"""Degrees that such a share is told of."""
+"""Degrees for which such a share is given."""
 
 
 def values(diagnosis: Diagnosis, cause: Cause, effects: Sequence[Effect]) -> list[str]:

@@ -108,7 +108,7 @@ def parts_what(wanted: Mapping[str, Any]) -> str:
     """
     Return what a measurement is to tell apart, in a sentence; nothing where it parts nothing.
 
-    What an explanation without a name depends on is told only where the two differ in that alone:
+    What an explanation without a name depends on is reported only where the two differ in that alone:
     the curves that stand for it may run over something else than what it was found to depend on.
     """
     one, other = wanted.get('between') or ((), ())
@@ -227,9 +227,9 @@ def inputs_section(inputs: Sequence[InputFile]) -> Html:
 _SHORT = 12
 """Digits of a hash that tell files apart on paper; the page has all."""
 _FILES = 4
-"""Files told on paper; the page has all."""
+"""Files listed on paper; the page has all."""
 _FINDINGS = 3
-"""Checks told on paper, the gravest; the page has all."""
+"""Checks listed on paper, the gravest; the page has all."""
 
 
 @on_page('print', 10)

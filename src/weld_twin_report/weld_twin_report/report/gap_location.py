@@ -34,7 +34,7 @@ _EVEN = 1.25
 """Ratio of the worst stretch to the best below which neither stands out: that much a dozen short
 stretches of one motion differ by for no other reason than posture and noise."""
 _DIRECTION = {'reversal': 'direction of motion'}
-"""What the causes above are told to depend on, where the map has another word for it."""
+"""Words of the causes above for a dependence that the map calls something else."""
 _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 

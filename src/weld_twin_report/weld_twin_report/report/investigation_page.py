@@ -194,7 +194,7 @@ def _left(side: Side, against: Side, belief: Mapping[str, Any]) -> bool:
     Return whether an explanation is among what is believed.
 
     What has nothing of its own is where the other is not; and a curve is not where the formula
-    that it was held against is.
+    that it was compared with is.
     """
     if not side:
         return not _stands(against, belief)

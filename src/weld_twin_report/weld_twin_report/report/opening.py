@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
-from weld_twin_nodes.wording.mending import advised, left_with, thought_mended
+from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets
 from weld_twin_nodes.wording.quantities import (
     counted,
-    left_of,
     millimetres,
     odds,
     percent,
+    shrink_ratio,
     small_turn,
     turns_only,
 )
@@ -63,7 +63,7 @@ WORDS = {
     'cause without a name, programs corrected by its curve',
     'standard deviation': 'two of three values lie within one, 95 of 100 within two',
 }
-"""Words of the page that not everybody has, each told once."""
+"""Words of the page that not everybody has, each explained once."""
 
 
 def header(answer: Answer) -> Html:
@@ -172,7 +172,7 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
     before, taken = largest(diagnosis), advised(diagnosis)
     reported: list[Child] = ['as it is, on what was recorded']
     if taken or (diagnosis.effects and not switches(diagnosis)):
-        after = left_with(diagnosis, taken).largest_after
+        after = remaining_with(diagnosis, taken).largest_after
         reported.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
         reported.append(mark(rule, after, _APART))
     link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
@@ -192,7 +192,7 @@ def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
 def _left(diagnosis: Diagnosis) -> Figure:
     every, taken = switches(diagnosis), advised(diagnosis)
     if taken and len(taken) < len(every):
-        remaining = left_with(diagnosis, taken)
+        remaining = remaining_with(diagnosis, taken)
         share = percent(remaining.rms_after / remaining.rms)
         reported = f'RMS, {share} of the RMS gap, on data not used for fitting'
         name = f'Left with {_which(diagnosis, taken)} mended'
@@ -209,7 +209,7 @@ def _how_much(diagnosis: Diagnosis) -> str:
     if turns_only(diagnosis):
         return 'RMS on data not used for fitting; what was found turns the tool'
     with_what = '' if diagnosis.effects or switches(diagnosis) else ', and nothing to be entered'
-    value, interval = left_of(shrink)
+    value, interval = shrink_ratio(shrink)
     return f'RMS, {value} of the RMS gap, on data not used for fitting{with_what} ({interval})'
 
 
@@ -296,7 +296,7 @@ def _left_over(rms: float, most: float, rule: Rule) -> Html:
 
 
 def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
-    remaining = left_with(diagnosis, range(len(switches(diagnosis))))
+    remaining = remaining_with(diagnosis, range(len(switches(diagnosis))))
     reported = _left_over(remaining.rms_after, remaining.largest_after, rule)
     return tag(
         'tr',
@@ -314,7 +314,7 @@ def _more(diagnosis: Diagnosis) -> Html:
     reported: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
     count = len(switches(diagnosis))
     if count > 2:
-        every = len(thought_mended(diagnosis)) == 2**count
+        every = len(switch_sets(diagnosis)) == 2**count
         name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
         reported += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
     return joined([*reported, 'A click on a cause leads to its card.'])

@@ -54,7 +54,7 @@ _FRAMES = {
         'the frame {by}, times the old value',
     ),
 }
-"""Makers whose frame of a positioner is told in numbers: as they write it."""
+"""Makers whose frame of a positioner is given in numbers: as they write it."""
 
 
 def old_and_new(effect: RootPose, brand: str, robot: Robot) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
-from weld_twin_nodes.wording.mending import left_with
+from weld_twin_nodes.wording.mending import remaining_with
 from weld_twin_nodes.wording.quantities import counted, millimetres, percent
 from weld_twin_nodes.wording.switches import as_it_is, parted, switches, trusted
 from weld_twin_nodes.wording.words import listed
@@ -28,7 +28,7 @@ _STATIONS = (
 _LISTED = 3
 """Samples that are named where they are not drawn, the farthest off first chosen."""
 _TENTH = 0.1
-"""Part of the gap below which what is left is told with a decimal."""
+"""Part of the gap below which what is left is reported with a decimal."""
 _RECORDINGS = 6
 """Recordings drawn over time."""
 
@@ -76,7 +76,7 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
 
 def _figures(diagnosis: Diagnosis) -> Html:
     """Return the figures that follow the switches."""
-    remaining = left_with(diagnosis, range(len(switches(diagnosis))))
+    remaining = remaining_with(diagnosis, range(len(switches(diagnosis))))
     share = remaining.rms_after / max(remaining.rms, 1e-300)
     cells: tuple[tuple[str, str, str, Child], ...] = (
         ('Left then', 'now-rms', millimetres(remaining.rms_after), 'RMS, on data not used for fitting'),

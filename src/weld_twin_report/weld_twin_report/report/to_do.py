@@ -15,13 +15,13 @@ from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.apart import ELSE, way
 from weld_twin_core.metrics.conformity import PASS, Rule
-from weld_twin_nodes.wording.mending import left_without, look_at, warning
+from weld_twin_nodes.wording.mending import look_at, remaining_without, warning
 from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.verdict import in_order
 from weld_twin_nodes.wording.words import (
     cause,
     cause_by_site,
-    found_name,
+    effect_name,
     listed,
     not_to_be_tried,
     open_sets,
@@ -38,7 +38,7 @@ from .controllers import gearing
 from .html import Child, tag
 
 _LARGEST = 3
-"""Actions told; the others are counted."""
+"""Actions listed; the others are counted."""
 TOGETHER = (
     'Take them in together, by corrected programs (weld-twin correct), or by the corrected '
     'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
@@ -94,7 +94,7 @@ def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
     for site in map(site_of, diagnosis.effects):
         if site in unsure:
             continue
-        remaining = left_without(diagnosis, causes[site]) if site in causes else None
+        remaining = remaining_without(diagnosis, causes[site]) if site in causes else None
         if share.get(site, 0.0) > most:
             out[site] = ''
         elif (
@@ -143,7 +143,7 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     out = []
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
-            action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
+            action = f'Should it be {effect_name(named)}: {action[:1].lower()}{action[1:]}'
         twins = ' '.join(same_words(diagnosis, site_of(named)))
         action = ' '.join(filter(None, [action, gearing(named.effect), twins]))
         worse = warning(diagnosis, causes[site_of(named)]) if site_of(named) in causes else ''
@@ -219,7 +219,7 @@ def warned(reported: str) -> list[Child]:
 
 
 _KINDS = 4
-"""Kinds of effects told; more are counted."""
+"""Kinds of effects listed; more are counted."""
 
 
 def reason_and_joints(why: str, diagnosis: Diagnosis) -> tuple[str, list[str]]:

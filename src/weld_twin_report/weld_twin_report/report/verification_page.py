@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from weld_twin_msgs_py.files.input_files import InputFile
-from weld_twin_nodes.offline.verifying import Left, Promise, Verification
+from weld_twin_nodes.offline.verifying import Promise, RemainingCause, Verification
 from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.words import called, cause, listed
 
@@ -57,28 +57,28 @@ def _promised(promise: Promise) -> str:
     return f'{millimetres(promise.rms)} RMS ({millimetres(promise.low)} to {millimetres(promise.high)})'
 
 
-def _of_cause(result: Verification, remaining: Left) -> str:
+def _of_cause(result: Verification, remaining: RemainingCause) -> str:
     moves = f'as it was it moves the tool by {millimetres(remaining.rms_m)} here'
     if remaining.state == 'open':
         return f'{_name(remaining)}: {_STATES["open"]}; {moves}'
     return f'{_name(remaining)}: {state(result, remaining)}, {_share(remaining)} of it is left; {moves}'
 
 
-def state(result: Verification, remaining: Left) -> str:
+def state(result: Verification, remaining: RemainingCause) -> str:
     """Return what became of a cause; of a program it is what the correction left of it."""
     if result.program and remaining.state in ('gone', 'stays'):
         return 'is corrected' if remaining.state == 'gone' else 'is not corrected'
     return _STATES[remaining.state]
 
 
-def _name(remaining: Left) -> str:
+def _name(remaining: RemainingCause) -> str:
     if len(remaining.sites) == 1:
         return cause(remaining.sites[0].effect, remaining.sites[0].joint)
     kind = remaining.sites[0].effect
     return f'{called(kind)} of {listed([str(site.joint) for site in remaining.sites])}'
 
 
-def _share(remaining: Left) -> str:
+def _share(remaining: RemainingCause) -> str:
     return f'{100.0 * remaining.share:.0f} ± {100.0 * remaining.std:.0f} %'
 
 
@@ -119,10 +119,10 @@ def _figures(result: Verification) -> Html:
 def _causes(result: Verification) -> Html | None:
     if not result.causes:
         return None
-    shown: dict[str, Callable[[Left], str]] = {
+    shown: dict[str, Callable[[RemainingCause], str]] = {
         'Cause': _name,
         'Now': lambda cause: state(result, cause),
-        'Left of it': lambda cause: '' if cause.state == 'open' else _share(cause),
+        'RemainingCause of it': lambda cause: '' if cause.state == 'open' else _share(cause),
         'As it was it moves the tool by': lambda cause: millimetres(cause.rms_m),
     }
     lead = 'What is left was held against what each cause of the diagnosis does on this motion.'

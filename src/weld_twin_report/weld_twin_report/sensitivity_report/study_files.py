@@ -103,7 +103,7 @@ def make_study(
     *,
     claims_on: Sequence[Robot] = (),  # robots the claims are measured on; none for no claims
     seams: Sequence[str] = SEAMS,  # bundled seams the claims are measured on
-    tell: Tell | None = None,  # told about progress
+    tell: Tell | None = None,  # called after every task
     seed: int = 0,  # of the claims
     force: bool = False,  # as `new_directory` takes it
 ) -> Path:

@@ -27,7 +27,7 @@ figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; backgroun
 .claims { font-size: .85rem; } table { margin-bottom: 1rem; }
 """
 _ADVISED = 5
-"""Tolerances to tighten that are told; the others gain less than these."""
+"""Tolerances to tighten that are listed; the others gain less than these."""
 _SHOWN = 12
 """Bars shown; the file has all."""
 

@@ -54,7 +54,7 @@ def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda
     """
     Return the application.
 
-    ``doors``: told when requests begin and end. ``live``: returns the last verdict of running
+    ``doors``: notified when requests begin and end. ``live``: returns the last verdict of running
     nodes.
     """
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
@@ -84,7 +84,7 @@ def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda
     ):
         app.add_api_route(path, answer, methods=methods, response_model=None)
     known = (TooMuch, TooSlow, Busy, ClientDisconnect, OSError, TwinError, HTTPException)
-    for kind in (*known, Exception):  # the last one is told on the server's terminal as well
+    for kind in (*known, Exception):  # the last one is logged on the server's terminal as well
         app.add_exception_handler(kind, site.refused)
     return Access(app, settings, people, doors)
 

@@ -92,7 +92,7 @@ class Directory:
             raise DataError(f"'{self.path}' is a file; give a folder with --dir")
         if not self.path.exists():
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with suppress(FileExistsError):  # another server was first, and is told by its lock
+            with suppress(FileExistsError):  # another server was first, and its lock says so
                 self.path.mkdir(mode=PRIVATE)
         if not (self.path / MARK).is_file() and not self._is_free():
             raise DataError(

@@ -4,7 +4,7 @@
 The fields of the forms: each is an option of a command, under a title that somebody understands.
 
 One table says what a field is called, what it may hold, and which commands take it. The commands do
-the work; what they say of an option is told as the field's title.
+the work; what they say of an option is the field's title.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ FIELDS = {
 }
 """By their names, in the order in which they are shown."""
 LARGEST = {'max_length': ('2', 'mm'), 'max_angle': ('1', 'deg')}
-"""The two fields that are one option, `--max-correction`, and what they are unless told."""
+"""The two fields that are one option, `--max-correction`, and what they are unless given."""
 ELSEWHERE = {
     'robot': 'Robot',
     'out': 'the place of results',

@@ -44,7 +44,7 @@ class Asked:
     """What was asked with a recording or a program."""
 
     robot: str
-    """A bundled robot, or the name of a robot file among those dropped; empty until it is told."""
+    """A bundled robot, or the name of a robot file among those dropped; empty until it is given."""
     apply: bool = False  # whether a mistake in data or set-up is corrected
     cell: str = ''
     at: str = ''
@@ -77,7 +77,7 @@ class Job:
     names: tuple[str, ...]  # of the files dropped
     asked: Asked
     state: str = WAITING
-    said: str = ''  # how far it is, or what was told last
+    said: str = ''  # how far it is, or what was reported last
     since: float = field(default_factory=time.time)  # when it was dropped, seconds since 1970
     seconds: float = 0.0  # what the work took
     kind: str = RECORDING  # 'recording' or 'program'
@@ -146,7 +146,7 @@ class Job:
 
     @property
     def command(self) -> str:
-        """Return the command that says most of what is told."""
+        """Return the command that says most of what the user gave."""
         return CORRECT if self.kind == PROGRAM else DIAGNOSE
 
     def uploads(self, folder: Path) -> Path:

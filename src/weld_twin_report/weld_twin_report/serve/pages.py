@@ -147,7 +147,7 @@ def _field(name: str, title: str, hint: str, value: str = '') -> Html:
 
 
 def _fields(names: Sequence[str], reported: Mapping[str, str]) -> list[Html]:
-    """Return fields of the table, filled with what was told before."""
+    """Return fields of the table, filled with what was given before."""
     out = []
     for name in names:
         field, value = FIELDS[name], reported.get(name, '')

@@ -47,7 +47,7 @@ STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
 """By the exit code of a command; any other is a failure."""
 HISTORY = 'history.db'
 NOT_ADDED = 'not in the history: '
-"""Begins what is told of a diagnosis that its history did not take."""
+"""Begins what is reported about a diagnosis that its history did not take."""
 UNKNOWN = 'unknown at '
 """Begins the party of who comes without a key: all of an address are like one user."""
 LOOK = 5.0

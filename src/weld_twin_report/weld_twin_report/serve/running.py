@@ -66,7 +66,7 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
     """
     Serve until it is interrupted.
 
-    ``tell``: told the address once the server listens. Raises DataError: what it needs is not
+    ``tell``: called with the address once the server listens. Raises DataError: what it needs is not
     installed, or the port is taken.
     """
     try:

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""An arm that is carried, or whose workpiece is moved, by joints that are told beforehand."""
+"""An arm that is carried, or whose workpiece is moved, by joints that are given beforehand."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .newton import polish
 
 
 def rest(robot: Robot) -> Array:
-    """Return where a positioner stands of which nothing is told: at zero, or nearest, (behind,)."""
+    """Return where a positioner stands that nobody has placed: at zero, or nearest, (behind,)."""
     return np.clip(
         np.zeros(robot.behind), *(v[: robot.behind] for v in (robot.lower, robot.upper))
     )
@@ -28,15 +28,15 @@ def rest(robot: Robot) -> Array:
 @dataclass(frozen=True, eq=False)
 class CarriedArm:
     """
-    A robot whose first joints are told, as a controller is told its external axes: (..., count).
+    A robot whose first joints are given, as a controller is given its external axes: (..., count).
 
     Inverse kinematics is that of the arm behind them, with its base where they put it. Raises
-    DataError: a joint of the positioner is not told, or no joint is left.
+    DataError: a joint of the positioner is not given, or no joint is left.
     """
 
     robot: Robot
     count: int
-    """Joints that are told: those of a positioner, and the first ones of the robot itself."""
+    """Joints that are given: those of a positioner, and the first ones of the robot itself."""
 
     def __post_init__(self) -> None:
         if not self.robot.behind <= self.count < self.robot.n:
@@ -66,49 +66,49 @@ class CarriedArm:
         still = {'T_world_base': np.eye(4), 'T_flange_tool': np.eye(4), 'controller': None}
         return self.robot.part(range(first, self.count), **still)
 
-    def _slid(self, reported: Array) -> Array:
+    def _slid(self, external: Array) -> Array:
         """Return the arm's base where the robot's own rows begin, shape (..., 4, 4)."""
         if self._track is None:
             return np.eye(4)
-        return forward(self._track, reported[..., self.robot.behind :])
+        return forward(self._track, external[..., self.robot.behind :])
 
-    def feet(self, reported: Array) -> Array:
+    def feet(self, external: Array) -> Array:
         """Return the base of the arm in the frame that the chain begins in, (..., 4, 4) [m]."""
         if not self.count:
-            return np.broadcast_to(np.eye(4), (*reported.shape[:-1], 4, 4))
-        return np.asarray(self.roots(reported) @ self._slid(reported))
+            return np.broadcast_to(np.eye(4), (*external.shape[:-1], 4, 4))
+        return np.asarray(self.roots(external) @ self._slid(external))
 
-    def roots(self, reported: Array) -> Array:
+    def roots(self, external: Array) -> Array:
         """Return where the robot's own rows begin in that frame, shape (..., 4, 4) [m]."""
         robot = self.robot
         if not robot.behind:
-            return np.broadcast_to(robot.T_world_base, (*reported.shape[:-1], 4, 4))
-        table = forward(robot.branches[0], reported[..., : robot.behind][..., ::-1])
+            return np.broadcast_to(robot.T_world_base, (*external.shape[:-1], 4, 4))
+        table = forward(robot.branches[0], external[..., : robot.behind][..., ::-1])
         return np.asarray(np.linalg.inv(table) @ robot.T_root_base)
 
-    def seen(self, poses: Array, reported: Array) -> Array:
+    def seen(self, poses: Array, external: Array) -> Array:
         """Return poses (..., 4, 4) as the arm's base sees them."""
-        return np.asarray(np.linalg.inv(self.feet(reported)) @ poses) if self.count else poses
+        return np.asarray(np.linalg.inv(self.feet(external)) @ poses) if self.count else poses
 
-    def whole(self, reported: Array, q: Array) -> Array:
-        """Return positions (..., n) of all joints, of those told (..., count) and of the arm."""
+    def whole(self, external: Array, q: Array) -> Array:
+        """Return positions (..., n) of all joints, of those given (..., count) and of the arm."""
         if not self.count:
             return q
-        reported = np.broadcast_to(reported, (*q.shape[:-1], self.count))
-        return np.concatenate([reported, q], axis=-1)
+        external = np.broadcast_to(external, (*q.shape[:-1], self.count))
+        return np.concatenate([external, q], axis=-1)
 
-    def solve(self, pose: Array, reported: Array, seed: Array | None = None) -> Array:
+    def solve(self, pose: Array, external: Array, seed: Array | None = None) -> Array:
         """Return every posture that reaches a pose (4, 4), shape (K, n), as `solve` does."""
         seed = None if seed is None else seed[self.count :]
-        return self.whole(reported, solve(self.arm, self.seen(pose, reported), seed))
+        return self.whole(external, solve(self.arm, self.seen(pose, external), seed))
 
-    def solve_path(self, poses: Array, reported: Array, seed: Array | None = None) -> PathSolution:
+    def solve_path(self, poses: Array, external: Array, seed: Array | None = None) -> PathSolution:
         """Return the arm's own joints along a path of poses (N, 4, 4), as `solve_path` does."""
         seed = None if seed is None else seed[self.count :]
-        return solve_path(self.arm, self.seen(poses, reported), seed)
+        return solve_path(self.arm, self.seen(poses, external), seed)
 
     def polish(self, q: Array, poses: Array) -> tuple[Array, Array]:
         """Return positions (N, n) closed onto poses by the arm, and the error left as `polish`."""
-        reported = q[..., : self.count]
-        result, error = polish(self.arm, q[..., self.count :], self.seen(poses, reported))
-        return self.whole(reported, result), error
+        external = q[..., : self.count]
+        result, error = polish(self.arm, q[..., self.count :], self.seen(poses, external))
+        return self.whole(external, result), error

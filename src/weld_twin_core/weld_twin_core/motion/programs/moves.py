@@ -61,7 +61,7 @@ class Move(NamedTuple):
     why: str = ''
     """Of an unknown move, why it is not understood."""
     along: bool = True
-    """The frame that a linear or circular move is told in goes along with a positioner. Where it
+    """The frame that a linear or circular move is given in goes along with a positioner. Where it
     stands still, the positioner must, too."""
 
     @property
@@ -78,7 +78,7 @@ class MoveProgram:
     """A pose, shape (4, 4) [m], or joint positions, shape (n,) [rad or m]."""
     pieces: tuple[tuple[Move, ...], ...]
     """Moves that follow each other; where a piece begins, nobody knows where the arm is."""
-    told: tuple[Array, ...] = ()
+    axes: tuple[Array, ...] = ()
     """Of every point the positions of the external axes, shape (m,) [rad or m]: the first joints
     of the robot, those of a positioner among them. Left out, there are none."""
 
@@ -89,11 +89,11 @@ class MoveProgram:
     @property
     def external(self) -> int:
         """Return how many of the robot's first joints are external axes."""
-        return self.told[0].size if self.told else 0
+        return self.axes[0].size if self.axes else 0
 
     def external_at(self, use: Use) -> Array:
         """Return where the external axes are to be at a use, shape (m,) [rad or m]."""
-        return self.told[use.point] if self.told else np.zeros(0)
+        return self.axes[use.point] if self.axes else np.zeros(0)
 
     def place(self, use: Use) -> Array:
         """Return where a use leads: ``T_base_tool``, shape (4, 4), or joints, shape (n,)."""

@@ -139,22 +139,22 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     if move.end is None:
         raise PathError(move.why or 'this move is not understood')
     arm = course.robot.with_frames(base=np.eye(4), tool=move.tool)
-    carried = CarriedArm(arm, course.program.external)
+    chain = CarriedArm(arm, course.program.external)
     if move.kind == 'joint' or (q is None and move.via is None):
-        return _joint_move(carried, course, move, q)
+        return _joint_move(chain, course, move, q)
     if q is None:
         raise PathError(
             'where the arm comes from is not known; let a joint move lead there, or say the '
             'joints with --start'
         )
-    reported = course.program.external_at(move.end)
-    turned = np.abs(reported - q[: reported.size])[: arm.behind].max(initial=0.0)
+    external = course.program.external_at(move.end)
+    turned = np.abs(external - q[: external.size])[: arm.behind].max(initial=0.0)
     if turned > CLOSED and not move.along:
         raise PathError(_STANDS)
     poses, via = tool_way(arm, course.program, move, forward(arm, q))
     share = np.linspace(0.0, 1.0, len(poses))[:, None]
     way = _on_the_way(
-        carried, poses, q, q[: reported.size] + share * (reported - q[: reported.size])
+        chain, poses, q, q[: external.size] + share * (external - q[: external.size])
     )
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
@@ -164,25 +164,25 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
 
 
-def _on_the_way(carried: CarriedArm, poses: Array, q: Array, reported: Array) -> Array:
+def _on_the_way(chain: CarriedArm, poses: Array, q: Array, external: Array) -> Array:
     """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
     if len(poses) < _SHORT:
-        start = carried.whole(reported, np.tile(q[reported.shape[1] :], (len(poses), 1)))
-        near, error = carried.polish(start, poses)
+        start = chain.whole(external, np.tile(q[external.shape[1] :], (len(poses), 1)))
+        near, error = chain.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
         if np.abs(error).max() < CLOSED and steps < _NEAR:
             return near
-    result = carried.whole(reported, carried.solve_path(poses, reported, q).q)
+    result = chain.whole(external, chain.solve_path(poses, external, q).q)
     if np.abs(result[0] - q).max() > _NEAR:
         raise ReachError('the arm would have to change its posture on the way')
     return result
 
 
-def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | None) -> _Reached:
+def _joint_move(chain: CarriedArm, course: _Course, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a joint move; where it comes from may not be known."""
     assert move.end is not None
-    arm, place = carried.robot, course.program.place(move.end)
-    end = place if place.ndim == 1 else _posture(carried, place, course, move, q)
+    arm, place = chain.robot, course.program.place(move.end)
+    end = place if place.ndim == 1 else _posture(chain, place, course, move, q)
     arm.check_positions(end[None])
     if q is None:
         return _Reached(end[None], np.zeros(1), -1)
@@ -194,19 +194,19 @@ def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | Non
 
 
 def _posture(
-    carried: CarriedArm, pose: Array, course: _Course, move: Move, q: Array | None
+    chain: CarriedArm, pose: Array, course: _Course, move: Move, q: Array | None
 ) -> Array:
     """Return the joint positions in which a move reaches a pose."""
     assert move.end is not None
-    arm, reported = carried.robot, course.program.external_at(move.end)
-    result = carried.solve(pose, reported, q)
+    arm, external = chain.robot, course.program.external_at(move.end)
+    result = chain.solve(pose, external, q)
     if move.suits is not None:
-        result = _turned(carried, result)
+        result = _turned(chain, result)
         result = result[move.suits(result)]
         if not len(result):
             raise ReachError('no posture of this robot there is the one that the program names')
     elif q is not None:
-        result = _turned(carried, result)
+        result = _turned(chain, result)
     elif len(result) > 1:
         result = _known(result, course, move)
     near = np.zeros(arm.n) if q is None else q
@@ -225,11 +225,11 @@ def _known(result: Array, course: _Course, move: Move) -> Array:
     return known
 
 
-def _turned(carried: CarriedArm, result: Array) -> Array:
+def _turned(chain: CarriedArm, result: Array) -> Array:
     """Return every solution on every full turn that the limits allow for the arm's joints."""
-    last, arm = [result], carried.robot
+    last, arm = [result], chain.robot
     for turn in (-2.0 * np.pi, 2.0 * np.pi):
-        for joint in np.flatnonzero(~arm.prismatic & (np.arange(arm.n) >= carried.count)):
+        for joint in np.flatnonzero(~arm.prismatic & (np.arange(arm.n) >= chain.count)):
             moved = result.copy()
             moved[:, joint] += turn
             inside = (moved >= arm.lower) & (moved <= arm.upper)
@@ -332,13 +332,13 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
         way = _way_length(piece, k)
         assert move.end is not None
         arm = robot.with_frames(base=np.eye(4), tool=move.tool)
-        carried = CarriedArm(arm, program.external)
+        chain = CarriedArm(arm, program.external)
         if move.kind == 'joint' or way == 1:
-            part = _joint_part(carried, program, move, q, first, way)
+            part = _joint_part(chain, program, move, q, first, way)
         else:
             at = max(int(piece.vias[k]) - first, 0)
             poses, _ = tool_way(arm, program, move, forward(arm, q[first]), way, at)
-            part = _closed(carried, piece.motion.q[first : first + way], poses, move)
+            part = _closed(chain, piece.motion.q[first : first + way], poses, move)
         q[first : first + way] = part
         q[first + way : last + 1] = part[-1]
     return JointMotion(piece.motion.t, q)
@@ -364,21 +364,21 @@ def _way_length(piece: Piece, k: int) -> int:
 
 
 def _joint_part(
-    carried: CarriedArm, program: MoveProgram, move: Move, q: Array, first: int, way: int
+    chain: CarriedArm, program: MoveProgram, move: Move, q: Array, first: int, way: int
 ) -> Array:
     assert move.end is not None
     place = program.place(move.end)
     end = place
     if place.ndim == 2:
-        end = _closed(carried, q[first + way - 1][None], place[None], move)[0]
+        end = _closed(chain, q[first + way - 1][None], place[None], move)[0]
     if way == 1:
         return np.asarray(end[None])
     share = np.linspace(0.0, 1.0, way)[:, None]
     return np.asarray(q[first] + share * (end - q[first]))
 
 
-def _closed(carried: CarriedArm, q: Array, poses: Array, move: Move) -> Array:
-    result, error = carried.polish(q, poses)
+def _closed(chain: CarriedArm, q: Array, poses: Array, move: Move) -> Array:
+    result, error = chain.polish(q, poses)
     if np.abs(error).max() > CLOSED:
         raise ReachError(f'{move.where}: out of reach, or at a singularity')
     return result

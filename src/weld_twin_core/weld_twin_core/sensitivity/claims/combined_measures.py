@@ -25,7 +25,7 @@ _GROUPS = {
 _ORDER = ('angular', 'backlash', 'length', 'initial')
 """The paper's final ranking (V.vii), the strongest first."""
 _DRAWS = 200
-"""Draws of all errors at once, of which median and extremes are told."""
+"""Draws of all errors at once, of which median and extremes are reported."""
 _RANKED = 500
 """Scalings of the tolerances under which the order of the groups is looked at."""
 _FACTOR = 3.0

@@ -3,8 +3,8 @@
 """
 Current positions of a FANUC controller, ``MD:CURPOS.DG``, one after the other in a file.
 
-The controller makes the file whenever it is fetched, by FTP or by its web page. Its joints are told to a
-hundredth of a degree; where it takes its own tool to be is no measurement, and is left out.
+The controller makes the file whenever it is fetched, by FTP or by its web page. Its joints have
+hundredths of a degree; where it takes its own tool to be is no measurement, and is left out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MARK = re.compile(r'^CURRENT JOINT POSITION', re.MULTILINE)
 _GROUP = re.compile(r'^Group #:\s*(\d+)', re.MULTILINE)
 _JOINT = re.compile(r'^Joint\s+(\d+):\s*(-?\d*\.?\d+)', re.MULTILINE)
 _FIRST_LINES = 8000
-"""Characters at the top in which such a file is told: a page of the controller has a heading."""
+"""Characters at the top by which such a file is recognised: a page of the controller has a heading."""
 _ARM = '1'
 """Group of motion that is the arm; others are positioners and tables."""
 

@@ -21,7 +21,7 @@ from ...files.csv_text import is_number
 from ..formats import Form, Rank, Read, form
 
 _LOOK = 40
-"""Lines at the top in which a list is told."""
+"""Lines at the top by which a list is recognised."""
 _NAMES = (1, 2, 3)
 """Names before the numbers: collection, group, point."""
 _POINT = 3

@@ -21,7 +21,7 @@ SEAM = {
     'seed': 0,
     'start_stamp': 1_000_000_000,
 }
-"""What is simulated of a seam unless told; a stamp [ns] of 0 would mean unset."""
+"""What is simulated of a seam unless given; a stamp [ns] of 0 would mean unset."""
 
 
 def run(given: Given) -> int:

@@ -22,9 +22,9 @@ from . import OF_PROGRAM
 
 RESULT = 'correction.json'
 NOISE = '0.03mm'
-"""Of a measured coordinate unless told: a tracker or a measuring arm."""
+"""Of a measured coordinate unless given: a tracker or a measuring arm."""
 LARGEST = ('2mm', '1deg')
-"""How far a point may be moved unless told: more is no inaccuracy of an arm, but a mistake."""
+"""How far a point may be moved unless given: more is no inaccuracy of an arm, but a mistake."""
 BAGS = ('.mcap', '.db3')
 
 

@@ -36,7 +36,7 @@ from ...report.diagnosis_page import Sheet, joint_labels
 from ...report.sections import Demand
 
 LINES = 'WELD_TWIN_PROGRESS'
-"""Variable of the environment: 'lines' has every step told as a line on stderr."""
+"""Variable of the environment: 'lines' writes every step as a line to stderr."""
 TABLES = ('.csv', '.tsv', '.txt', '.dat', '.dg')
 """Endings of files that are tables of text, read as `weld-twin import` reads them."""
 UNSOUND = 3
@@ -120,7 +120,7 @@ def _diagnosis(given: Given) -> Diagnosis:
 def _read(
     given: Given, robot: Robot, own_frame: bool, tell: Callable[[str], None]
 ) -> list[Recording]:
-    """Return all recordings, as artefact and instrument are told."""
+    """Return all recordings, with artefact and instrument as given."""
     from weld_twin_msgs_py.files.instruments import instrument, measured_by
 
     what = instrument(given.instrument) if given.instrument else None

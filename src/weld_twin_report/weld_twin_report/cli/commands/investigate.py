@@ -34,14 +34,14 @@ SLOWER = 2.0
 LEAST = 0.5
 """Minutes that an experiment is planned with where hardly any are left; it is then not asked for."""
 BUDGET = 60.0
-"""Minutes of experiments, with what has to be set up for them, unless told: one visit to a cell."""
+"""Minutes of experiments, with what has to be set up for them, unless given: one visit to a cell."""
 PASSED_ON = (
     *('align', 'effects_known', 'cell_box'),
     *('base_link', 'tip_link', 'flange_link'),
 )
 """Options of the beginning that every diagnosis takes."""
 PLAN = {'minutes': None, 'postures': None, 'noise': 0.03, 'seconds': 10.0, 'spread': 75.0}
-"""What a plan is made with unless told: minutes, number, mm, s and degrees."""
+"""What a plan is made with unless given: minutes, number, mm, s and degrees."""
 
 
 def run(given: Given) -> int:
@@ -308,7 +308,7 @@ class _Investigation:
         first, later = investigation.recordings(self.state)
         known = investigation.changed(self.state)
         known |= dict.fromkeys(bags, changes) if changes else {}
-        # Seen with another tool, or from elsewhere, they cannot be held against the first.
+        # Seen with another tool, or from elsewhere, they cannot be compared with the first.
         by_itself = not first or any(what in FRAMES for what in known.values())
         every = [*first, *later, *bags]
         result = self._diagnosed(every, place, known, ['--confirm'] * by_itself)

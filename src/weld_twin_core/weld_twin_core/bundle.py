@@ -299,16 +299,16 @@ def adjusted(seen: Sightings) -> _Adjusted:
         np.zeros(0),
     )
     state = replace(state, unknowns=np.zeros(state.sizes.size))
-    reported = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
+    given = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
     for _ in range(_REWEIGHTED):
-        weight, _ = _weights(state, reported)
+        weight, _ = _weights(state, given)
         state = _descended(_Point.at(state, weight)).state
-    state = _loosened(state, reported)
-    weight, noise = _weights(state, reported)
+    state = _loosened(state, given)
+    weight, noise = _weights(state, given)
     return _result(_Point.at(state, weight), noise)
 
 
-def _loosened(state: _State, reported: Array) -> _State:
+def _loosened(state: _State, given: Array) -> _State:
     """
     Return the state with points of targets as well known as the images say, never better.
 
@@ -317,7 +317,7 @@ def _loosened(state: _State, reported: Array) -> _State:
     """
     said = [target.sigma for target in state.seen.targets]
     for _ in range(_LEARNED):
-        weight, _ = _weights(state, reported)
+        weight, _ = _weights(state, given)
         normal = _Point.at(state, weight).reduced.normal
         known = 1.0 - np.diag(np.linalg.inv(normal + np.eye(len(normal))))
         at = state.unknowns.size - sum(t.points.size for t in state.seen.targets)
@@ -395,16 +395,16 @@ def _lies(seen: Sightings, c: int) -> bool:
     return bool((most > _BEYOND * size).any() and (most <= _BEYOND * size[::-1]).all())
 
 
-def _weights(state: _State, reported: Array) -> tuple[Array, float]:
+def _weights(state: _State, given: Array) -> tuple[Array, float]:
     """Return the weight of every sighting [1/px], and the noise of a coordinate [px]."""
-    residual = state.rows()[0] * reported[:, None]
+    residual = state.rows()[0] * given[:, None]
     # Poses took their share of the noise: six numbers of every stamp, and of unknowns some.
     free = max(1.0 - (6 * len(state.tool) + UNKNOWNS) / max(residual.size, 1), 0.05)
     spread = _NORMAL * float(np.median(np.abs(residual))) / np.sqrt(free)
     spread = max(float(spread), _LEAST_PIXEL)
     off = np.sqrt((residual**2).mean(axis=1)) / spread
-    weight = reported / spread * np.minimum(1.0, _HUBER / np.maximum(off, 1e-12))
-    return np.asarray(weight), spread / float(np.median(reported))
+    weight = given / spread * np.minimum(1.0, _HUBER / np.maximum(off, 1e-12))
+    return np.asarray(weight), spread / float(np.median(given))
 
 
 def _descended(here: _Point) -> _Point:

@@ -359,9 +359,9 @@ class Recording:
         )
         for name, signal, wanted in sides:
             if signal is not None and signal.value.shape[1:] != wanted:
-                reported = ', '.join(['K', *map(str, wanted)]) if wanted else 'K,'
+                shape = ', '.join(['K', *map(str, wanted)]) if wanted else 'K,'
                 raise DataError(
-                    f'{name} of recording {self.name!r} must have shape ({reported}), '
+                    f'{name} of recording {self.name!r} must have shape ({shape}), '
                     f'got {signal.value.shape}'
                 )
 

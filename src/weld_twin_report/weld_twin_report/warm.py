@@ -115,30 +115,30 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
     resource.setrlimit(resource.RLIMIT_FSIZE, (asked['file'],) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.environ['WELD_TWIN_PROGRESS'] = 'lines'
-    reported, printed = Telling(out), io.StringIO()
+    progress, printed = Telling(out), io.StringIO()
     code = 1
     try:
         if asked.get('folder'):
             os.chdir(asked['folder'])
-        with contextlib.redirect_stderr(reported), contextlib.redirect_stdout(printed):
+        with contextlib.redirect_stderr(progress), contextlib.redirect_stdout(printed):
             from weld_twin_nodes.cli.main import main as command
 
             code = command([str(word) for word in asked['words']])
     except SystemExit as stop:
         code = stop.code if isinstance(stop.code, int) else 1
     except MemoryError:
-        reported.last = _TOO_MUCH
+        progress.last = _TOO_MUCH
     except BaseException as error:
-        reported.last = f'{type(error).__name__}: {error}'
+        progress.last = f'{type(error).__name__}: {error}'
     # The command tells by itself of a file that it has no room for, in a sentence.
-    if code and any(sign in reported.last for sign in _NO_ROOM):
-        reported.last = _TOO_MUCH
+    if code and any(sign in progress.last for sign in _NO_ROOM):
+        progress.last = _TOO_MUCH
     used = resource.getrusage(resource.RUSAGE_SELF)
     answer(
         out,
         {
             'code': code,
-            'said': reported.last,
+            'said': progress.last,
             'memory': used.ru_maxrss * KIB,
             'cpu_s': used.ru_utime + used.ru_stime,
         },

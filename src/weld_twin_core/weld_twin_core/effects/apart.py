@@ -17,7 +17,7 @@ def way(families: Sequence[str]) -> str:
     names = set(families)
     for name in sorted(names & set(REGISTRY)):
         (other,) = names - {name} if len(names) == 2 else {name}
-        reported = REGISTRY[name].traits.apart.get(other)
-        if reported and len(names) < 3:
-            return reported
+        way = REGISTRY[name].traits.apart.get(other)
+        if way and len(names) < 3:
+            return way
     return ELSE

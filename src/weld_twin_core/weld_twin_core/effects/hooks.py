@@ -308,9 +308,9 @@ def gathered(kind: Any) -> None:
     asked = {k: own[k] for k in own if k in OF_GROUP}
     if not traits and not asked:
         return
-    reported = ', '.join(sorted([*traits, *asked]))
+    misplaced = ', '.join(sorted([*traits, *asked]))
     text = (
-        f'{kind.__name__}: {reported} belong to traits, twin, search or fit; see docs/effects.md'
+        f'{kind.__name__}: {misplaced} belong to traits, twin, search or fit; see docs/effects.md'
     )
     warnings.warn(text, DeprecationWarning, stacklevel=4)
     kind.traits = replace(kind.traits, **traits)

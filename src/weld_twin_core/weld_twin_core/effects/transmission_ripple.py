@@ -207,8 +207,8 @@ class TransmissionRipple(Effect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Return one instance per integer order that the joint's range of motion can tell."""
-        reported = highest_order(view.joint(view.robot.index(str(joint))))
-        return cls.search.lines(str(joint), np.arange(1.0, min(_MAX_ORDER, int(reported)) + 1.0))
+        most = highest_order(view.joint(view.robot.index(str(joint))))
+        return cls.search.lines(str(joint), np.arange(1.0, min(_MAX_ORDER, int(most)) + 1.0))
 
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""

@@ -41,8 +41,8 @@ def size(value: float, digits: int = 3) -> str:
 
 def metres(value: float) -> str:
     """Return a signed length [m] in mm."""
-    reported = f'{value * 1e3:+.3f}' if abs(value) < _FINE else number(value * 1e3)
-    return f'{reported} mm'
+    digits = f'{value * 1e3:+.3f}' if abs(value) < _FINE else number(value * 1e3)
+    return f'{digits} mm'
 
 
 def radians(value: float) -> str:
@@ -68,8 +68,8 @@ def frame(step: Array, shifted: str, turned: str) -> str:
     """
     moved = _axes(np.asarray(step[:3]) * 1e3, _LEAST_MM, 'mm along', 3)
     about = _axes(np.degrees(step[3:]), _LEAST_DEG, 'deg about', 4)
-    reported = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
-    return ' and '.join(filter(None, reported)) or 'less than 0.005 mm'
+    parts = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
+    return ' and '.join(filter(None, parts)) or 'less than 0.005 mm'
 
 
 def _axes(values: Array, least: float, words: str, places: int) -> str:

@@ -215,9 +215,9 @@ class _System:
         blocks = [[first + np.diag(series.prior)]]
         right = [series.weighted.sum(axis=0)]
         for each in result:
-            cross, _, reported = self._against(each.shape, np.array([each.place]))
+            cross, _, right_side = self._against(each.shape, np.array([each.place]))
             blocks.append([cross[..., 0], *self._among(each)])
-            right.append(reported[:, 0])
+            right.append(right_side[:, 0])
         self._matrix = _symmetric(blocks)
         self._right = np.concatenate([np.atleast_1d(r) for r in right])
         self._inverse = np.linalg.inv(self._matrix)
@@ -292,7 +292,7 @@ class _System:
         key = shape.kind, shape.begin
         if key not in series.shapes:
             series.shapes[key] = self._against(shape, places)
-        cross, own, reported = series.shapes[key]
+        cross, own, right_side = series.shapes[key]
         rows = [np.moveaxis(cross, 0, -1)]  # (P first, C, m)
         for each in self._terms:
             between = series.precision[:, each.place, places]
@@ -300,7 +300,7 @@ class _System:
         stacked = np.concatenate(rows, axis=0)  # (P + found, C, m)
         solved = np.tensordot(self._inverse, stacked, axes=1)
         information = own - np.einsum('ajm,ajn->jmn', stacked, solved)
-        right = reported.T - np.einsum('a,ajm->jm', self.solution, stacked)
+        right = right_side.T - np.einsum('a,ajm->jm', self.solution, stacked)
         # A coordinate that nobody has seen carries no information; its size is zero.
         eye = np.eye(own.shape[1])
         floor = 1e-9 * np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
@@ -402,6 +402,6 @@ def _odds(series: Series, system: _System, shape: _Shape, place: int, scatter: f
     known = information[place] / scatter
     # What was believed of a value holds for how far it moves over the recordings.
     prior = series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
-    reported = known @ mean[place]
-    fall = reported @ np.linalg.solve(known + prior, reported)
+    shown = known @ mean[place]
+    fall = shown @ np.linalg.solve(known + prior, shown)
     return 0.5 * float(fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1])

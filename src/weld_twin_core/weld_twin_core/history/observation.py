@@ -72,9 +72,9 @@ class Observation:
         width = self.prior_std
         # value = variance * (precision of the data) * (what the data say), along each axis
         along = axes.T @ (self.value / width)
-        reported = np.where(shown > 0.0, along / variance, 0.0)
+        values = np.where(shown > 0.0, along / variance, 0.0)
         precision = (axes * shown) @ axes.T / np.outer(width, width)
-        return precision, (axes @ reported) / width
+        return precision, (axes @ values) / width
 
     @cached_property
     def _shown(self) -> tuple[Array, Array, Array]:
@@ -136,11 +136,11 @@ def series_of(observations: Sequence[Observation]) -> Series:
     width = np.zeros(len(names))
     error: list[list[float]] = [[] for _ in names]
     precision = np.zeros((days.size, len(names), len(names)))
-    reported = np.zeros((days.size, len(names)))
+    products = np.zeros((days.size, len(names)))
     whitening = []
     for w, each in enumerate(ordered):
         at = np.array([place[name] for name in each.names], int)
-        precision[w][np.ix_(at, at)], reported[w, at] = each.information()
+        precision[w][np.ix_(at, at)], products[w, at] = each.information()
         whitening.append((at, each.whitening))
         width[at] = np.maximum(width[at], each.prior_std)
         for k, std in zip(at, np.sqrt(np.diag(each.covariance)), strict=True):
@@ -155,7 +155,7 @@ def series_of(observations: Sequence[Observation]) -> Series:
         days,
         names,
         precision,
-        reported,
+        products,
         1.0 / width**2,
         np.array(changing, dtype=int),
         tuple(whitening),

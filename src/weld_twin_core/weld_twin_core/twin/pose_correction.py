@@ -144,8 +144,8 @@ class PoseCorrection:
             self._begin()
             return
         way, size = _away(before, looked.pose)
-        reported = _extrapolated(before, self._bend, way, size)
-        off = _size((reported - looked.values)[:6])
+        expected = _extrapolated(before, self._bend, way, size)
+        off = _size((expected - looked.values)[:6])
         if size > _REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way

@@ -100,17 +100,17 @@ def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
         len(each.interface_names) != len(each.values) for each in message.interface_values
     ):
         raise DataError('it has not one value for every interface of every joint it names')
-    reported = [
+    joints = [
         (name, dict(zip(values.interface_names, values.values, strict=True)))
         for name, values in zip(message.joint_names, message.interface_values, strict=True)
     ]
-    reported = [(name, values) for name, values in reported if 'position' in values]
+    joints = [(name, values) for name, values in joints if 'position' in values]
     unknown = float('nan')
     yield SimpleNamespace(
         header=message.header,
-        name=[name for name, _ in reported],
-        position=[values['position'] for _, values in reported],
-        velocity=[values.get('velocity', unknown) for _, values in reported],
+        name=[name for name, _ in joints],
+        position=[values['position'] for _, values in joints],
+        velocity=[values.get('velocity', unknown) for _, values in joints],
     )
 
 

@@ -104,10 +104,10 @@ class Intake:
     @property
     def remarks(self) -> list[str]:
         """Return what to report about names and frames that were taken for granted."""
-        reported = (self.joints, self.measuring_frame, self.wrench_frame)
+        parts = (self.joints, self.measuring_frame, self.wrench_frame)
         joints = self.joints
         remarks = [
-            *(each.remark for each in reported),
+            *(each.remark for each in parts),
             joints.velocity_remark,
             joints.beside.remark,
         ]

@@ -117,8 +117,8 @@ def assembled(
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])
-    measured, reported = _measurements(streams, epoch)
-    notes += reported
+    measured, more = _measurements(streams, epoch)
+    notes += more
     if static is None:
         static = looks_static(robot, motion, measured)
     if static:
@@ -164,11 +164,11 @@ def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | N
     """
     t, n = seconds(joints.ns, int(joints.ns[0])), robot.n
     q, qd, effort = joints.rows[:, :n], joints.rows[:, n : 2 * n], joints.rows[:, 2 * n :]
-    reported = JointSignal(t, effort) if effort.size else None
+    effort_signal = JointSignal(t, effort) if effort.size else None
     untold = np.isnan(qd).any(axis=1, keepdims=True)
     if untold.all():
-        return JointMotion(t, q), reported
-    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), reported
+        return JointMotion(t, q), effort_signal
+    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), effort_signal
 
 
 def _measurements(
@@ -238,9 +238,9 @@ def _unloaded_before(
         return whole, measured, (said,)
     if measured is None:
         return whole, None, ()
-    reported = np.flatnonzero(measured.t >= late)
-    count = measured.t.size - reported.size
-    if not count or not reported.size:
+    later = np.flatnonzero(measured.t >= late)
+    count = measured.t.size - later.size
+    if not count or not later.size:
         return whole, measured, ()
     said = f'{count} measurements from before the first wrench are left out'
-    return whole, measured.take(reported), (said,)
+    return whole, measured.take(later), (said,)

@@ -59,11 +59,11 @@ def other_names(robot: Robot, there: Sequence[str]) -> str:
     """Return which joints are there in place of the robot's, and the option that joins them."""
     if not there:
         return ''
-    reported = f'; it holds {", ".join(there[:_LISTED])}' + (' and more' * (len(there) > _LISTED))
+    others = f'; it holds {", ".join(there[:_LISTED])}' + (' and more' * (len(there) > _LISTED))
     # Drivers that number their joints do so along the arm.
     ordered = there if len(there) == robot.n else ('NAME',) * robot.n
     pairs = ' '.join(f'{own}={name}' for own, name in zip(robot.joint_names, ordered, strict=True))
-    return f'{reported}. If these are the same joints, say so with --joint-map {pairs}'
+    return f'{others}. If these are the same joints, say so with --joint-map {pairs}'
 
 
 def _meant(present: Present, kinds: tuple[tuple[str, str], ...], asked: tuple[str, ...]) -> str:

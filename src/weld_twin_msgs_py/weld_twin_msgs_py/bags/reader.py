@@ -80,11 +80,11 @@ def unpack_file(packed: Path, out: Path) -> None:
     most = max(SMALL, RATIO * packed.stat().st_size)
     free = shutil.disk_usage(out.parent).free
     with packed.open('rb') as raw:
-        reported = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
-    if reported > most:
+        size = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
+    if size > most:
         raise _bomb()
-    if reported > free:
-        raise _no_room(packed, out, f'unpacks to {reported / 1e9:.1f} GB')
+    if size > free:
+        raise _no_room(packed, out, f'unpacks to {size / 1e9:.1f} GB')
     done = 0
     try:
         with packed.open('rb') as raw, zstd.open(raw, 'rb') as source, out.open('wb') as sink:

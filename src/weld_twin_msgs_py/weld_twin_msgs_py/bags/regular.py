@@ -85,8 +85,8 @@ class Stream:
             self._repeated += error.behind == 0
             self._late += error.behind > 0
         else:
-            reported = f"message {self.messages - 1} of '{self.topic}': {error}"
-            count, first = self._other.get(type(error), (0, reported))
+            sentence = f"message {self.messages - 1} of '{self.topic}': {error}"
+            count, first = self._other.get(type(error), (0, sentence))
             self._other[type(error)] = count + 1, first
 
     def jumped(self, back: int) -> DataError:

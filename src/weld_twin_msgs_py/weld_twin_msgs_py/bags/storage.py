@@ -46,11 +46,9 @@ def look(path: Path) -> Bag:
         raise DataError(f"'{path}' is a ROS 1 bag; convert it with rosbags-convert first")
     if path.is_file():
         if path.suffix not in SUFFIXES:
-            reported = (
-                '; a table becomes one with weld-twin import' if path.suffix in TABLES else ''
-            )
+            hint = '; a table becomes one with weld-twin import' if path.suffix in TABLES else ''
             raise DataError(
-                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file{reported}"
+                f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file{hint}"
             )
         custom = _information(path.parent).get('custom_data') or {}
         return Bag([path], custom if isinstance(custom, dict) else {})

@@ -136,8 +136,8 @@ class _Entries:
         motion, measured = self.recording.joints, self.recording.measured
         wrench, temperature = self.recording.wrench, self.recording.temperature
         effort = self.recording.effort
-        reported = None if effort is None else effort.at(motion.t)
-        yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, reported)
+        efforts = None if effort is None else effort.at(motion.t)
+        yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, efforts)
         if self.recording.images is not None:
             yield self.images(self.recording.images)
         elif measured is not None:

@@ -126,8 +126,8 @@ def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:
     wrong = content.get('unsound')
     if wrong and isinstance(wrong[0], dict):
-        reported = str(wrong[0].get('sentence', '')).rstrip('.')
-        return f"diagnosis '{path}' holds no model, for its data were unsound: {reported}"
+        sentence = str(wrong[0].get('sentence', '')).rstrip('.')
+        return f"diagnosis '{path}' holds no model, for its data were unsound: {sentence}"
     return f"diagnosis '{path}' holds no model; make it anew with diagnose"
 
 

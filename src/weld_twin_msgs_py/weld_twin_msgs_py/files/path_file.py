@@ -61,15 +61,15 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
             f'{where} needs one number for each joint, or lists of one length'
         ) from None
     last = max(robot.index(name) for name in knots)
-    reported = np.zeros((columns[0].size, max(last + 1, robot.behind)))
-    reported[:, : robot.behind] = rest(robot)
+    external = np.zeros((columns[0].size, max(last + 1, robot.behind)))
+    external[:, : robot.behind] = rest(robot)
     for name, column in zip(knots, columns, strict=True):
-        reported[:, robot.index(name)] = column
-    if columns[0].ndim != 1 or not np.isfinite(reported).all() or reported.shape[1] >= robot.n:
+        external[:, robot.index(name)] = column
+    if columns[0].ndim != 1 or not np.isfinite(external).all() or external.shape[1] >= robot.n:
         raise PathError(f'{where} needs finite numbers, and a joint that is left to the arm')
-    still = np.clip(np.zeros((len(reported), robot.n)), robot.lower, robot.upper)
-    robot.check_positions(np.concatenate([reported, still[:, reported.shape[1] :]], axis=1))
-    return reported
+    still = np.clip(np.zeros((len(external), robot.n)), robot.lower, robot.upper)
+    robot.check_positions(np.concatenate([external, still[:, external.shape[1] :]], axis=1))
+    return external
 
 
 def _points(path: FilePath | str) -> list[list[float]]:

@@ -142,15 +142,15 @@ class JointStateDecoder:
 
         Raises DataError: the bytes are none.
         """
-        for head, (frame, name, body, at, end, reported) in self._known.items():
+        for head, (frame, name, body, at, end, moving) in self._known.items():
             if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
                 values = body.unpack_from(data, at)
                 n = len(name)
-                velocity = values[n + 2 : 2 * n + 2] if reported else values[n + 2 :]
+                velocity = values[n + 2 : 2 * n + 2] if moving else values[n + 2 :]
                 if values[n] == len(velocity) and data[1] == 1 and data[0] == 0:
                     header = Header(Time(sec, nanosec), frame)
-                    if not reported:
+                    if not moving:
                         return JointState(header, name, values[:n], velocity)
                     if values[2 * n + 2] == n:
                         return JointState(header, name, values[:n], velocity, values[2 * n + 4 :])

@@ -189,9 +189,9 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         if moves:
             pieces.append(tuple(moves))
     still = np.zeros(count)
-    reported = tuple(still if point.external is None else point.external for point in points)
+    external = tuple(still if point.external is None else point.external for point in points)
     values = tuple(point.value for point in points)
-    return MoveProgram(values, tuple(pieces), reported if count else ())
+    return MoveProgram(values, tuple(pieces), external if count else ())
 
 
 def _with_external(point: Point, count: int) -> Point:

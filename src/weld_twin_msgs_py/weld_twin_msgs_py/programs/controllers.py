@@ -87,8 +87,8 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
             )
         return ()
     axes = [_axis(text.strip(), pattern, robot) for text in given.split(',')]
-    reported = sorted(axis.joint for axis in axes)
-    if reported != list(range(max(len(names), len(axes)))) or len({a.label for a in axes}) < len(
+    joints = sorted(axis.joint for axis in axes)
+    if joints != list(range(max(len(names), len(axes)))) or len({a.label for a in axes}) < len(
         axes
     ):
         raise DataError(
@@ -272,13 +272,13 @@ def controller_of(
     tools, bases: frames that were given, shape (4, 4) [m].
     cell: what was given about external axes.
     """
-    reported = cell or Cell()
-    axes = external_axes(reported.external, robot, language)
+    given = cell or Cell()
+    axes = external_axes(given.external, robot, language)
     arm = CarriedArm(robot, len(axes)).arm
     frames = robot.controller or controller_frames(arm)
     origin, notes = np.array(frames.base), _linked(frames)
-    if reported.world is not None:
-        origin = np.array(np.linalg.inv(reported.world))
+    if given.world is not None:
+        origin = np.array(np.linalg.inv(given.world))
     mix = _counting(arm, robot, language, origin, notes)
     if axes and language in LABELS:
         mix = shown_order(robot, axes) @ mix
@@ -292,8 +292,8 @@ def controller_of(
         _lower(bases),
         notes,
         axes,
-        reported.along,
-        reported.world is not None or len(axes) == robot.behind,
+        given.along,
+        given.world is not None or len(axes) == robot.behind,
         robot.behind > 0,
     )
 

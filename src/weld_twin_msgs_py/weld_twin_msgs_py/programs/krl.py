@@ -198,9 +198,9 @@ class KrlReader(Reader):
         for keys, notation in ((POSE_KEYS, KUKA_POSE), (axes, self.context.degrees())):
             if all(key in content.numbers for key in keys):
                 numbers = [content.numbers[key] for key in keys]
-                reported = [content.numbers.get(label) for label in known]
+                numbered = [content.numbers.get(label) for label in known]
                 point = self.program.add_point(
-                    name, numbers, notation, file, self.context.external(reported)
+                    name, numbers, notation, file, self.context.external(numbered)
                 )
                 outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
                 if any(content.numbers[key].value != 0.0 for key in outer):

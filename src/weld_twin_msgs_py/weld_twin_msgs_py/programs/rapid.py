@@ -201,8 +201,8 @@ class RapidReader(Reader):
             point = self.program.add_point(name, numbers, self.context.degrees())
         else:
             numbers = self._numbers(parts[:2], (3, 4), name, start)
-            reported = self.context.external(given)
-            point = self.program.add_point(name, numbers, ABB_POSE, external=reported)
+            placed = self.context.external(given)
+            point = self.program.add_point(name, numbers, ABB_POSE, external=placed)
             if len(parts) > 2:
                 conf = self._numbers(parts[2:3], (4,), name, start)
                 self.suits[point] = quadrants([round(number.value) for number in conf])

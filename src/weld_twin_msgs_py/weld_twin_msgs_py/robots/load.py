@@ -31,9 +31,9 @@ _DROPPED = (*_YAML_SUFFIXES, '.urdf')
 
 def _folders() -> tuple[Path, ...]:
     """Return where robots of one's own lie: what the environment says, else the user's settings."""
-    reported = os.environ.get(_FOLDERS, '')
-    if reported:
-        return tuple(Path(part).expanduser() for part in reported.split(os.pathsep) if part)
+    folders = os.environ.get(_FOLDERS, '')
+    if folders:
+        return tuple(Path(part).expanduser() for part in folders.split(os.pathsep) if part)
     home = os.environ.get('XDG_CONFIG_HOME') or os.path.join(os.path.expanduser('~'), '.config')
     return (Path(home, 'weld_twin', 'robots'),)
 

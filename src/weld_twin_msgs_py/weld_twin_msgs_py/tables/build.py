@@ -220,9 +220,9 @@ class _Reading:
         off = () if self.columns.position else self.columns.difference
         sign = 1.0 if self.options.difference == 'add' else -1.0
         units = (self.options.length_unit, *map(self.columns.unit, named + off))
-        reported = next((unit for unit in units if unit), None)
+        own = next((unit for unit in units if unit), None)
         raw = self.cells.stack(named) + (sign * self.cells.stack(off) if off else 0.0)
-        unit, sentence = length_unit(raw, self.robot, q, reported)
+        unit, sentence = length_unit(raw, self.robot, q, own)
         what = 'a measured position' if self.columns.position else 'a position'
         position = self._metres(named, unit, what)
         if self.columns.position:
@@ -267,8 +267,8 @@ class _Reading:
         own = [
             self.options.rotation_unit or self.columns.unit(name) for name in self.columns.rotation
         ]
-        reported = next((unit for unit in own if unit), None)
-        unit, sentence = angle_unit(values, reported, 'measured angles')
+        named = next((unit for unit in own if unit), None)
+        unit, sentence = angle_unit(values, named, 'measured angles')
         if sentence:
             self.said.append(sentence)
         angles = values * [

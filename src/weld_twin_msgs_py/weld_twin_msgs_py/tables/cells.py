@@ -129,8 +129,8 @@ def read_cells(
     if result is not None:
         return result
     table = split_lines(path, decoded, delimiter, said)
-    reported = {name: parted(name)[1] for name in table.header}
-    header, rows = without_units(path, table.header, table.rows, reported)
+    units = {name: parted(name)[1] for name in table.header}
+    header, rows = without_units(path, table.header, table.rows, units)
     if decimal is None:
         commas = said[:1] == ["columns are separated by ','"] or delimiter == ','
         decimal = decimal_sign(path, rows, ',' if commas else None)

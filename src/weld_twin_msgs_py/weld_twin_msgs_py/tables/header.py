@@ -265,8 +265,8 @@ def _listing(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[
     """Return what the header has: the joints that were understood, then the other names."""
     joints = [name for group in numbered.values() for _, name in sorted(group.items())]
     others = [part.name for part in parts if part.name not in joints]
-    reported = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
-    said = ', '.join(f'{word} {shortened(names)}' for word, names in reported if names)
+    columns = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
+    said = ', '.join(f'{word} {shortened(names)}' for word, names in columns if names)
     return f'; found {said}' if said else ''
 
 

@@ -95,14 +95,12 @@ def joint_units(
     robot, names, options, said, judge: as for `joint_angles`.
     """
     turning, sliding = ~robot.prismatic, robot.prismatic
-    reported = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
-    usual = Units(
-        reported[0] or _usual_angle(q[:, turning]), reported[1] or _usual_slide(q, robot)
-    )
+    units = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
+    usual = Units(units[0] or _usual_angle(q[:, turning]), units[1] or _usual_slide(q, robot))
     chosen = usual
     if judge is not None and len(q) >= ENOUGH:
-        open_angle = reported[0] is None and bool(turning.any())
-        open_slide = reported[1] is None and bool(sliding.any())
+        open_angle = units[0] is None and bool(turning.any())
+        open_slide = units[1] is None and bool(sliding.any())
         others = [
             Units(angle, slide)
             for angle in (('rad', 'deg') if open_angle else (usual.angle,))
@@ -110,11 +108,11 @@ def joint_units(
         ]
         chosen = _fitting(q, usual, others, robot, names, options, judge)
     fitted = ' (the measured positions fit no other unit)' if chosen != usual else ''
-    if reported[0] is None and turning.any():
+    if units[0] is None and turning.any():
         word = {'deg': 'degrees', 'rad': 'radians'}[chosen.angle]
         size = largest(q[:, turning])
         said.append(f'joint angles are in {word} (up to {size:.4g}){fitted}')
-    if reported[1] is None and sliding.any():
+    if units[1] is None and sliding.any():
         size = largest(q[:, sliding])
         said.append(
             f'sliding joints are in {chosen.slide} (up to {size:.4g}){fitted}; --slide-unit decides'
@@ -153,8 +151,8 @@ def _kinds(robot: Robot, options: TableOptions) -> tuple[tuple[Sequence[bool], s
 
 def _given_unit(names: Sequence[str], kind: Sequence[bool], given: str | None) -> str | None:
     """Return the unit that an option or the header gives one of some columns."""
-    reported = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
-    return given or next((unit for unit in reported if unit), None)
+    own = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
+    return given or next((unit for unit in own if unit), None)
 
 
 def _usual_angle(values: Array) -> str:

@@ -365,13 +365,13 @@ class Cell:
         """
         end, so_far = time.monotonic() + limit, None
         while not condition():
-            reported = what if isinstance(what, str) else what()
+            event = what if isinstance(what, str) else what()
             if any(process.code for process in self.processes):
-                raise CellTimeout(f'a node died before {reported}' + ''.join(self._logs()))
+                raise CellTimeout(f'a node died before {event}' + ''.join(self._logs()))
             if progress is not None and (now := progress()) != so_far:
                 end, so_far = time.monotonic() + limit, now
             if time.monotonic() > end:
-                raise CellTimeout(f'waited {limit:g} s for {reported}' + ''.join(self._logs()))
+                raise CellTimeout(f'waited {limit:g} s for {event}' + ''.join(self._logs()))
             self._executor.spin_once(timeout_sec=0.02)
 
     def meet(self) -> None:

@@ -403,11 +403,11 @@ class Compensator(ManagedNode):
 
         self._work_out(goal, tell)
 
-    def _work_out(self, goal: Any, reported: Callable[[Judged], None]) -> None:
+    def _work_out(self, goal: Any, done: Callable[[Judged], None]) -> None:
         """Have a goal worked out beside, with what is known now."""
         start = self._arm.start(time.monotonic(), self.setting('max_age'))
         names = self._intake.joints.names
-        self._judge.judge(goal, names, self._present(), limits_of(self), start, reported)
+        self._judge.judge(goal, names, self._present(), limits_of(self), start, done)
 
     def _tell_added(self, header: Any, result: CorrectedGoal) -> None:
         """Publish what is added at every point, at the time when the arm is to be there."""

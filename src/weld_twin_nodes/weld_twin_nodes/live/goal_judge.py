@@ -89,12 +89,12 @@ class GoalAudit:
             }
         text = json.dumps(line)
         self._out.publish(AUDIT.message_class()(data=text))
-        reported = f'goal {text}'
+        sentence = f'goal {text}'
         if below or verdict == 'refused':
-            self._node.get_logger().warning(reported)
+            self._node.get_logger().warning(sentence)
             self._node.health.say(f'goal {line["verdict"]}: {line["why"]}')
         else:
-            self._node.get_logger().info(reported)
+            self._node.get_logger().info(sentence)
         self._write(text)
 
     def _write(self, text: str) -> None:
@@ -135,7 +135,7 @@ class GoalJudge:
         model: ProgramModel,
         limits: GoalLimits,
         start: Start,
-        reported: Callable[[Judged], None],
+        done: Callable[[Judged], None],
     ) -> None:
         """
         Work a goal out; then tell.
@@ -145,7 +145,7 @@ class GoalJudge:
         try:
             points = self._read(goal, names)
         except TwinError as error:
-            reported((Refusal(str(error)), ()))
+            done((Refusal(str(error)), ()))
             return
         doing = self._goals.submit(corrected_goal, model, points.goal, limits, start)
 
@@ -155,9 +155,9 @@ class GoalJudge:
             timer.cancel()
             self._node.destroy_timer(timer)
             try:
-                reported((_tolerated(goal, points, doing.result()), points.columns))
+                done((_tolerated(goal, points, doing.result()), points.columns))
             except TwinError as error:
-                reported((Refusal(str(error)), ()))
+                done((Refusal(str(error)), ()))
 
         timer = self._node.every(POLL, look)
 

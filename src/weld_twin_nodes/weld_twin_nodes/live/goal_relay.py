@@ -179,9 +179,9 @@ class GoalRelay:
         result = outcome.result
         happened = self._since(running.token)
         if happened:
-            reported = f'weld_twin: ended as begun, though {happened}'
-            result.error_string = '; '.join(filter(None, [result.error_string, reported]))
-            self._node.get_logger().warning(reported)
+            sentence = f'weld_twin: ended as begun, though {happened}'
+            result.error_string = '; '.join(filter(None, [result.error_string, sentence]))
+            self._node.get_logger().warning(sentence)
         if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             above.succeed()
         elif outcome.status == GoalStatus.STATUS_CANCELED and above.is_cancel_requested:

@@ -213,11 +213,11 @@ class Health:
         """Return the node itself and each of its inputs, since the last call."""
         now = time.monotonic()
         every = [*filter(None, [self.fault]), *self.lasting.values(), *self._said[-3:]]
-        reported = list(dict.fromkeys(every))  # what begins to last is said, too
+        warnings = list(dict.fromkeys(every))  # what begins to last is said, too
         own = Status(
             self._node,
-            ERROR if self.fault else WARN if reported else OK,
-            '; '.join(reported) or self.running,
+            ERROR if self.fault else WARN if warnings else OK,
+            '; '.join(warnings) or self.running,
             {
                 'inputs': len(self.inputs),
                 'told': self._said_in_all,

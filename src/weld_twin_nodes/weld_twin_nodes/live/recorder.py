@@ -192,14 +192,14 @@ class RecordingRun:
         """Note what every publisher sent and what is missing of it, and say so."""
         self._concluded = True
         lacking = self._shortfalls()
-        reported: dict[str, Any] = {}
+        counts: dict[str, Any] = {}
         for name, topic in self._topics.items():
             sent = self._book.sent(name)
             if name in lacking:
-                reported[name] = lacking[name].to_mapping()
+                counts[name] = lacking[name].to_mapping()
             elif sent is not None and 0 < sent.number <= topic.taken.number:
-                reported[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
-        self._bag.note(COMPLETENESS, reported)
+                counts[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
+        self._bag.note(COMPLETENESS, counts)
         sentences = [short.sentence(name) for name, short in lacking.items()]
         unknown = [name for name, topic in self._topics.items() if not topic.source.kind]
         sentences += [f'{name}: nobody published this topic' for name in unknown]
@@ -211,8 +211,8 @@ class RecordingRun:
             sentences += self._book.unheard(self._publishers)
         for k, sentence in enumerate(sentences):
             self._node.keep(f'incomplete {k}', sentence)
-        if reported and not lacking:
-            total = sum(row['sent'] for row in reported.values())
+        if counts and not lacking:
+            total = sum(row['sent'] for row in counts.values())
             self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
 
     def close(self) -> None:

@@ -339,20 +339,20 @@ def tolerance_entry(
     """
     if not 0.0 < tolerance < 1.0:
         raise DataError(f'--tolerance must be above zero, got {tolerance * 1e3:g} mm')
-    reported = {}
+    sides = {}
     for name, value in zip(('before', 'after'), made.accuracy, strict=True):
         if value is None or value.worsts is None:
             raise DataError('--tolerance needs a model that says how sure it is: a diagnosis.json')
         probability = float(value.within(tolerance) or 0.0)
-        reported[name] = {
+        sides[name] = {
             'probability': probability,
             'decision': conforms(probability),
             'sure_within_m': value.sure_within,
         }
     more = None
-    if reported['after']['decision'] != 'kept':
+    if sides['after']['decision'] != 'kept':
         more = _postures_more(made, model, tolerance, noise)
-    return {'tolerance_m': tolerance, **reported, 'postures_more': more}
+    return {'tolerance_m': tolerance, **sides, 'postures_more': more}
 
 
 def _postures_more(

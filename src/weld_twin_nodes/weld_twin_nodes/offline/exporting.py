@@ -226,11 +226,11 @@ def _read_again(made: Exported, text: str, language: str) -> None:
     """Refuse a program that does not lead where it is to lead when it is read."""
     tools = {'0': made.tool, '1': made.tool}
     controller = made.context.controller
-    reported = made.context._replace(
+    context = made.context._replace(
         controller=replace(controller, tools=tools, bases={}, notes=[])
     )
-    program = read_sources([Source(made.name, text)], reported, language)
-    result = travel(made.context.robot, to_moves(program, reported.robot, reported.controller))
+    program = read_sources([Source(made.name, text)], context, language)
+    result = travel(made.context.robot, to_moves(program, context.robot, context.controller))
     if result.lost:
         raise DataError(next(iter(result.lost.values())))
     q = np.concatenate([piece.motion.q[piece.ends] for piece in result.pieces])

@@ -160,8 +160,8 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     """
     del notes
     robot = model.robot
-    reported = [e for e in model.found if model.named is None or (e.name, e.site) in model.named]
-    offsets = joint_offsets(robot, of_the_robot((*model.known, *reported))) + _zeros(model)
+    named = [e for e in model.found if model.named is None or (e.name, e.site) in model.named]
+    offsets = joint_offsets(robot, of_the_robot((*model.known, *named))) + _zeros(model)
     turned, rows = model.turned, []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
@@ -274,15 +274,15 @@ def _zeros(model: Model) -> np.ndarray:
 
 def _readings(model: Model) -> list[str]:
     """Return what was mended, and which readings the files take."""
-    reported = _mended(model)
+    notes = _mended(model)
     if not any(mend.get('do') == 'joints' for mend in model.mends):
-        return reported
+        return notes
     if _zeros(model).any():
         return [
-            *reported,
+            *notes,
             'That is in the numbers below: they take the readings as they were recorded.',
         ]
-    return [*reported, 'The numbers below take readings in which that is mended.']
+    return [*notes, 'The numbers below take readings in which that is mended.']
 
 
 def _left_behind(model: Model) -> list[str]:

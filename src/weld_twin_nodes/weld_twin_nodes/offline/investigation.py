@@ -106,8 +106,8 @@ def is_sure(verdict: Mapping[str, Any]) -> bool:
 
     ``verdict``: of diagnosis.json, of either schema.
     """
-    reported = verdict.get('sure')
-    return float(verdict['confidence'] or 0.0) >= OLDER if reported is None else bool(reported)
+    sure = verdict.get('sure')
+    return float(verdict['confidence'] or 0.0) >= OLDER if sure is None else bool(sure)
 
 
 def belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> float:
@@ -139,8 +139,8 @@ def signs(result: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, f
 def _log_odds(result: Mapping[str, Any]) -> float:
     verdict = result['verdict']
     learned = verdict.get('learned')
-    reported = float((verdict['confidence'] if learned is None else learned) or 0.0)
-    bounded = min(max(reported, EXTREME), 1.0 - EXTREME)
+    probability = float((verdict['confidence'] if learned is None else learned) or 0.0)
+    bounded = min(max(probability, EXTREME), 1.0 - EXTREME)
     return log(bounded / (1.0 - bounded))
 
 
@@ -148,8 +148,8 @@ def _with_belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping
     verdict = result['verdict']
     if verdict['status'] not in STATED:
         return result
-    reported = belief(result, other)
-    earned = {'confidence': reported, 'learned': reported, 'sure': reported >= CLOSED}
+    probability = belief(result, other)
+    earned = {'confidence': probability, 'learned': probability, 'sure': probability >= CLOSED}
     return {**result, 'verdict': {**verdict, **earned}}
 
 
@@ -189,8 +189,8 @@ def _together(result: Mapping[str, Any], first: Any, second: Any) -> bool:
 
 
 def _words(result: Mapping[str, Any]) -> str:
-    reported = {'identified': 'the causes are identified', 'ambiguous': ALIKE}
-    return reported.get(result['verdict']['status'], 'nothing is left to explain above the noise')
+    endings = {'identified': 'the causes are identified', 'ambiguous': ALIKE}
+    return endings.get(result['verdict']['status'], 'nothing is left to explain above the noise')
 
 
 def _open_ends(result: Mapping[str, Any]) -> bool:
@@ -366,8 +366,8 @@ def question(
             f'{max(remaining, 0.0):.1f} min are left, and nothing that fits in would part what is left',
         )
     if not wanted or wanted.get('motion') is None or by_hand:
-        reported = '' if not wanted else f': {wanted["sentence"]}'
-        return 'nothing would part them', f'no motion decides between what is left{reported}'
+        instead = '' if not wanted else f': {wanted["sentence"]}'
+        return 'nothing would part them', f'no motion decides between what is left{instead}'
     if sigma is not None and sigma < NOTHING:
         return (
             'nothing would part them',

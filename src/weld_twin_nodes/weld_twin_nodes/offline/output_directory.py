@@ -205,13 +205,13 @@ def _decided(note: Path) -> Change:
     return Change(str(change.mark), place, _digests(change.drop), new)
 
 
-def _digests(reported: Mapping[str, object]) -> Digests:
+def _digests(entries: Mapping[str, object]) -> Digests:
     """Return digests by names that stay in their folder, refused if one does not."""
-    for name in reported:
+    for name in entries:
         path = PurePosixPath(name)
         if not path.parts or path.is_absolute() or '..' in path.parts or '\0' in name:
             raise ValueError(f'{name!r} is no name of a file in this folder')
-    return {name: str(value) for name, value in reported.items()}
+    return {name: str(value) for name, value in entries.items()}
 
 
 def _is_no_list(folder: Path) -> bool:

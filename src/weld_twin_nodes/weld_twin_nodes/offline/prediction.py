@@ -137,11 +137,11 @@ def predictor(
         )
     # Clocks are apart by another time in every run. Where something was measured, that tells.
     clocks = place if place is not None else -1 if recording.measured is None else chosen
-    source, reported = mended_source(model, robot, recording, clocks)
+    source, notes = mended_source(model, robot, recording, clocks)
     twin = timed(path, model, chosen, source)
     if len(twin.effects) < len(model.twin(chosen).effects):
-        reported = ' '.join([reported, *left_behind(model.found)]).strip()
-    return Predictor(twin, read_posterior(robot, path), chosen, source, reported)
+        notes = ' '.join([notes, *left_behind(model.found)]).strip()
+    return Predictor(twin, read_posterior(robot, path), chosen, source, notes)
 
 
 def on_one_clock(recording: Recording) -> Recording:
@@ -257,10 +257,10 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     content, twin = diagnosis_of(path), build_twin(robot, path, mended=True)
     model = Predictor(twin, read_posterior(robot, path) if content else None)
     stored = read_model(robot, path) if 'model' in content else None
-    given, reported = recording, ''
+    given, notes = recording, ''
     if stored is not None:
         # Its clocks are its own, and commands need none.
-        recording, reported = mended_source(stored, robot, given, -1)
+        recording, notes = mended_source(stored, robot, given, -1)
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     share = None
     if model.posterior is not None:
@@ -273,7 +273,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     motion = result.motion
     if stored is not None and recording is not given:
         motion = _as_given(motion, stored)
-    return Compensated(result, model, model.outside(recording), least, motion, reported)
+    return Compensated(result, model, model.outside(recording), least, motion, notes)
 
 
 def _as_given(motion: JointMotion, stored: Model) -> JointMotion:

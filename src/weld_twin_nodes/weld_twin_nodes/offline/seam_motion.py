@@ -39,8 +39,8 @@ def plan_motion(
     if path in KINDS:
         return plan(robot, default_seam(robot, path), law, rate, fit=not speed)
     seam, torch = read_path(path)
-    reported = read_external(path, robot)
-    return plan(robot, seam, law, rate, torch=torch, fit=not speed, told=reported)
+    external = read_external(path, robot)
+    return plan(robot, seam, law, rate, torch=torch, fit=not speed, told=external)
 
 
 def joint_motion(

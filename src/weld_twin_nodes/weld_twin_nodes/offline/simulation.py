@@ -117,14 +117,14 @@ class Simulation:
 
     def _analysis(self, make: Messages) -> Iterator[Entry]:
         """Yield deviations, and metrics now and then and after the last one."""
-        count, reported, stamp = 0, 0, 0
+        count, last, stamp = 0, 0, 0
         metrics: dict[str, float | int] = {}
         for count, ((stamp, vector), metrics) in enumerate(self.deviations(), start=1):
             yield Entry(stamp, DEVIATION.name, make.vector3(stamp, vector, BASE))
             if count % METRICS_EVERY == 0:
-                reported = count
+                last = count
                 yield _metrics(make, stamp, metrics)
-        if count != reported:
+        if count != last:
             yield _metrics(make, stamp, metrics)
 
 

@@ -153,15 +153,15 @@ def warning(diagnosis: Diagnosis, k: int) -> str:
     remaining = remaining_without(diagnosis, k)
     if remaining is None or not (remaining.grows or remaining.rises):
         return ''
-    reported = (
+    words = (
         f'the largest deviation would grow from {_both(remaining)}'
         if remaining.grows
         else f'the RMS would rise from {millimetres(remaining.rms)} to '
         f'{millimetres(remaining.rms_after)}'
     )
     if unnamed(diagnosis.causes[k]):
-        return f'Do not correct programs by its curve: {reported}.'
-    return f'Not this alone: {reported}; mend it together with the others.'
+        return f'Do not correct programs by its curve: {words}.'
+    return f'Not this alone: {words}; mend it together with the others.'
 
 
 def look_at(diagnosis: Diagnosis, k: int) -> list[str]:

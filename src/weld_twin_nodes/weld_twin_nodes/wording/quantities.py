@@ -183,11 +183,11 @@ def in_short(value: float, std: float | None, factor: float = 1.0, unit: str = '
     value = factor * value
     tail = unit if unit.startswith('°') else f' {unit}' if unit else ''
     places = min(max(_THREE - 1 - floor(log10(abs(value) or 1.0)), 0), 9)
-    reported = _signed(f'{value:.{places}f}')
+    digits = _signed(f'{value:.{places}f}')
     if std is None or not isfinite(std) or std <= 0.0:
-        return f'{reported}{tail}'
+        return f'{digits}{tail}'
     error = max(round(factor * std, places), 10.0**-places)
-    return f'{reported} ± {error:.{places}f}{tail}'
+    return f'{digits} ± {error:.{places}f}{tail}'
 
 
 def _signed(number: str) -> str:
@@ -212,15 +212,15 @@ def short_rows(
         error: Any = std.get(p.name)
         factor, unit = display_unit(p.name, effect.unit(p, robot))
         if np.ndim(value):
-            reported = _that_count(
+            words = _that_count(
                 value, error, *((DEGREES, '°') if unit == 'mrad' else (factor, unit))
             )
         elif unit == 'mrad':
             beside = in_short(float(value), None, factor, unit)
-            reported = f'{in_short(float(value), error, DEGREES, "°")} ({beside})'
+            words = f'{in_short(float(value), error, DEGREES, "°")} ({beside})'
         else:
-            reported = in_short(float(value), None if np.ndim(error) else error, factor, unit)
-        out += [(p.name, reported)] if reported else []
+            words = in_short(float(value), None if np.ndim(error) else error, factor, unit)
+        out += [(p.name, words)] if words else []
     return out
 
 
@@ -250,10 +250,10 @@ def parameter_rows(
     """
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
-    reported = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
+    parameters = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
     return [
         (p.name, _shown(p.name, effect.unit(p, robot), getattr(effect, p.name), std.get(p.name)))
-        for p in reported
+        for p in parameters
     ]
 
 

@@ -46,8 +46,8 @@ def _together(sites: Sequence[Site]) -> str:
     kind = sites[0].effect
     own = [str(site.joint) for site in sites if site.effect == kind and site.joint]
     more = [f'{len(own) - _NAMED} more'] if len(own) > _NAMED else []
-    reported = called(kind, listed([*own[:_NAMED], *more]) if own else None)
-    return listed([reported, *(site_name(site) for site in sites if site.effect != kind)], 'or')
+    name = called(kind, listed([*own[:_NAMED], *more]) if own else None)
+    return listed([name, *(site_name(site) for site in sites if site.effect != kind)], 'or')
 
 
 def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
@@ -59,10 +59,10 @@ def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
 
 def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
     """Return the switches, largest share first; none where no cause can be thought away."""
-    reported = diagnosis.contributions
-    if reported is None or not reported.parts or diagnosis.contacts is not None:
+    contributions = diagnosis.contributions
+    if contributions is None or not contributions.parts or diagnosis.contacts is not None:
         return ()
-    count = reported.parts[0].shape[0]
+    count = contributions.parts[0].shape[0]
     own = [k for k, cause in enumerate(diagnosis.causes) if cause.members]
     out = [Switch(cause_name(diagnosis, diagnosis.causes[k]), (k,)) for k in own[:MOST]]
     rest = tuple(own[MOST:]) + tuple(range(len(diagnosis.causes), count))
@@ -75,12 +75,16 @@ def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
     Without switches what is left is the residual after, and nothing is added to it.
     """
-    traces, reported, all_switches = diagnosis.traces, diagnosis.contributions, switches(diagnosis)
-    if reported is None or not all_switches:
+    traces, contributions, all_switches = (
+        diagnosis.traces,
+        diagnosis.contributions,
+        switches(diagnosis),
+    )
+    if contributions is None or not all_switches:
         return traces.after, tuple(np.zeros((0, *part.shape)) for part in traces.after)
-    return reported.left, tuple(
+    return contributions.left, tuple(
         np.array([part[list(switch.members)].sum(axis=0) for switch in all_switches])
-        for part in reported.parts
+        for part in contributions.parts
     )
 
 

@@ -40,12 +40,14 @@ def in_order(diagnosis: Diagnosis) -> list[int]:
     Shares of places without a name say what their own motion tells, which a second place may tell
     as well; what a curve takes off is what a reader can have.
     """
-    reported = diagnosis.contributions
+    contributions = diagnosis.contributions
     count = len(diagnosis.causes)
-    if reported is None:
+    if contributions is None:
         return list(range(count))
     taken = [0.0] * count
-    for run, (remaining, parts) in enumerate(zip(reported.left, reported.parts, strict=True)):
+    for run, (remaining, parts) in enumerate(
+        zip(contributions.left, contributions.parts, strict=True)
+    ):
         good = diagnosis.traces.trusted[run] if diagnosis.traces.trusted else slice(None)
         whole = (remaining + parts.sum(axis=0))[good]
         for k in range(count):
@@ -90,12 +92,10 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
             first = f'The {size} is explained best by {listed(names)}'
             return f'{first}; each is as sure as its card says.', _gain(diagnosis)
         return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
-    reported = (
-        f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
-    )
+    words = f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
     first = (
         f'The {size} comes from {len(names)} errors together, mostly '
-        f'{_families(diagnosis)}; the largest is {names[0]} {reported}.'
+        f'{_families(diagnosis)}; the largest is {names[0]} {words}.'
     )
     return first, _gain(diagnosis)
 
@@ -170,19 +170,17 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return where an unknown cause sits, and what its curve or what fits best brings."""
     first, *others = (diagnosis.causes[k] for k in in_order(diagnosis))
-    reported = f'comes mostly from {cause_words(first)};'
+    words = f'comes mostly from {cause_words(first)};'
     if first.share < HALF and others:
         # What another place holds is more: "mostly" would say the opposite of the bars below.
-        reported = (
-            f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
-        )
+        words = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
     why = 'no known effect explains it'
     if diagnosis.confidence < HALF:
         why = 'what causes it is open'
     if not_to_be_tried(diagnosis):
         why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     return (
-        f'The gap of {millimetres(diagnosis.gap.rms_m)} {reported} {why}.',
+        f'The gap of {millimetres(diagnosis.gap.rms_m)} {words} {why}.',
         f'{_instead(diagnosis)} on data not used for fitting; {_noise(diagnosis)}.',
     )
 
@@ -192,10 +190,10 @@ def _instead(diagnosis: Diagnosis) -> str:
     every, taken = switches(diagnosis), advised(diagnosis)
     if taken and len(taken) < len(every):
         where = [likely(diagnosis.causes[every[at].members[0]].place) for at in taken]
-        reported = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
+        what = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
         remaining = remaining_with(diagnosis, taken)
         before, after = millimetres(remaining.rms), millimetres(remaining.rms_after)
-        return f'Programs corrected by {reported}, {before} shrinks to {after}'
+        return f'Programs corrected by {what}, {before} shrinks to {after}'
     shrink = diagnosis.shrink
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
     if shrink.ratio >= STAYS:

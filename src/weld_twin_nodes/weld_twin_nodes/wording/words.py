@@ -134,12 +134,12 @@ def likely(
 
 def leading(alternatives: Sequence[tuple[str, float]]) -> list[tuple[str, float]]:
     """Return the most probable, as many as are together likelier than not."""
-    reported: list[tuple[str, float]] = []
+    likeliest: list[tuple[str, float]] = []
     for item in alternatives[:_OPEN]:
-        if sum(p for _, p in reported) > HALF:
+        if sum(p for _, p in likeliest) > HALF:
             break
-        reported.append(item)
-    return reported
+        likeliest.append(item)
+    return likeliest
 
 
 def cause_words(cause: Cause) -> str:
@@ -267,8 +267,10 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
 def untried_in_short(diagnosis: Diagnosis) -> str:
     """Return that some effects were not tried; of many only the first, as the first step has all."""
     names = not_to_be_tried(diagnosis)
-    reported = names if len(names) <= _NAMED else [*names[: _NAMED - 1], f'{len(names) - 2} more']
-    return f'{listed(reported)} {"was" if len(names) == 1 else "were"} not tried'
+    listed_names = (
+        names if len(names) <= _NAMED else [*names[: _NAMED - 1], f'{len(names) - 2} more']
+    )
+    return f'{listed(listed_names)} {"was" if len(names) == 1 else "were"} not tried'
 
 
 def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:

@@ -115,11 +115,11 @@ def leave_open(job: Job, progress: Progress) -> None:
 
 
 def _diagnosed(job: Job, recording: Recording, progress: Progress) -> Diagnosis:
-    reported: list[str] = []
+    lines: list[str] = []
 
     def tell(text: str) -> None:
-        reported.append(text)
-        progress(min(len(reported) / STEPS, 0.99))
+        lines.append(text)
+        progress(min(len(lines) / STEPS, 0.99))
 
     return diagnose([recording], job.robot, progress=tell)
 

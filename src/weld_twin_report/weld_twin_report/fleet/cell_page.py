@@ -95,10 +95,10 @@ def _head(cell: str, home: str | None, ways: Html | None, subject: str | None = 
 def _span(entries: Sequence[Entry]) -> str:
     """Return how many diagnoses there are, and of when."""
     count = len(entries)
-    reported = counted(count, 'diagnosis', 'diagnoses')
+    number = counted(count, 'diagnosis', 'diagnoses')
     first, last = entries[0].at.date(), entries[-1].at.date()
     more = 'the last ' if count == NEWEST else ''
-    return f'{more}{reported}, {first}' + (f' to {last}' if last != first else '')
+    return f'{more}{number}, {first}' + (f' to {last}' if last != first else '')
 
 
 def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> str:

@@ -87,9 +87,9 @@ class Listed:
         A file that is not there counts by its name: once it is there, it is another request.
         """
         files = [self.recording, self.robot, self.effects_known, self.contacts]
-        reported = [_content(name) for name in files]
+        contents = [_content(name) for name in files]
         rest = (self.cell, self.at, self.align, self.base_link, self.tip_link, str(self.apply))
-        return digest(__version__, *reported, *rest)
+        return digest(__version__, *contents, *rest)
 
 
 def _content(name: str) -> str:
@@ -139,23 +139,23 @@ def _check_heads(file: Path, heads: list[str], names: list[str]) -> None:
 def _line(file: Path, number: int, row: Mapping[str | None, str | None]) -> Listed:
     if None in row or None in row.values():
         raise DataError(f"'{file}' line {number} has not as many cells as the first line")
-    reported = {str(name): str(value).strip() for name, value in row.items()}
+    values = {str(name): str(value).strip() for name, value in row.items()}
     for name in NEEDED:
-        if not reported[name]:
+        if not values[name]:
             raise DataError(f"'{file}' line {number} has no {name}")
-    if why := not_a_cell(reported['cell']):
+    if why := not_a_cell(values['cell']):
         raise DataError(f"'{file}' line {number}: {why}")
     for name in PATHS:
-        if reported.get(name):
-            reported[name] = str(file.parent / reported[name])
-    if (file.parent / reported['robot']).is_file():
-        reported['robot'] = str(file.parent / reported['robot'])
+        if values.get(name):
+            values[name] = str(file.parent / values[name])
+    if (file.parent / values['robot']).is_file():
+        values['robot'] = str(file.parent / values['robot'])
     else:
-        reported['robot'] = as_file(reported['robot'])
-    apply = YES.get(reported.pop('apply', '').lower())
+        values['robot'] = as_file(values['robot'])
+    apply = YES.get(values.pop('apply', '').lower())
     if apply is None:
         raise DataError(f"'{file}' line {number}: apply is yes or no")
-    listed = Listed(**reported, apply=apply)
+    listed = Listed(**values, apply=apply)
     try:
         _ = listed.date
     except DataError as error:
@@ -226,8 +226,8 @@ class _Writing:
     def take(self, result: Mapping[str, Any]) -> Iterator[Run | None]:
         """Write a result, and those that wait; yield what was written, None for what was there."""
         before = len(self._waiting)
-        reported = Entry.of_plain(result['entry']) if result['entry'] else None
-        self._waiting.append((Run(**result['run']), reported))
+        entry = Entry.of_plain(result['entry']) if result['entry'] else None
+        self._waiting.append((Run(**result['run']), entry))
         # Once patience was in vain, results do not each wait for it again.
         yield from self._write(None if before == 0 else 0.0)
 
@@ -242,9 +242,9 @@ class _Writing:
 
     def _write(self, patience: float | None, *, quiet: bool = True) -> Iterator[Run | None]:
         while self._waiting:
-            run, reported = self._waiting[0]
+            run, entry = self._waiting[0]
             try:
-                written = self.runs.write(run, reported, patience)
+                written = self.runs.write(run, entry, patience)
             except Unavailable:
                 if quiet:
                     return
@@ -344,8 +344,8 @@ def _unsound(out: Path) -> str:
     """Return what is wrong with data or set-up."""
     from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
-    reported = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
-    return str(reported[0]['sentence']) if reported else 'data or set-up are wrong'
+    faults = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
+    return str(faults[0]['sentence']) if faults else 'data or set-up are wrong'
 
 
 def _warm(limits: Limits) -> Guarded:

@@ -171,32 +171,32 @@ def _coordinates(
     posterior: Mapping[str, Any] | None, file: Path
 ) -> tuple[tuple[str, ...], Array, Array, Array]:
     """Return names, values, widths before the data and covariance of what is the arm's own."""
-    reported = [] if posterior is None else posterior['coordinates']
-    if not reported or 'prior_std' not in reported[0]:
+    coordinates = [] if posterior is None else posterior['coordinates']
+    if not coordinates or 'prior_std' not in coordinates[0]:
         raise DataError(
             f"diagnosis '{file}' does not say what was believed before the data: an older version "
             'wrote it; diagnose the recording again'
         )
     assert posterior is not None
-    count = Counter(each['name'] for each in reported)
+    count = Counter(each['name'] for each in coordinates)
     # What has no name of its own cannot be followed from one diagnosis to the next.
     keep = [
         k
-        for k, each in enumerate(reported)
+        for k, each in enumerate(coordinates)
         if not each['name'].startswith(PASSING) and count[each['name']] == 1
     ]
     # What is weighed over many priors cannot be freed of one; files of before 0.1 had one alone.
     plain = posterior.get(
         'single_prior',
-        {'value': [each['value'] for each in reported], 'covariance': posterior['covariance']},
+        {'value': [each['value'] for each in coordinates], 'covariance': posterior['covariance']},
     )
-    whole = np.zeros((len(reported), len(reported)))
+    whole = np.zeros((len(coordinates), len(coordinates)))
     for k, row in enumerate(plain['covariance']):
         whole[k, : k + 1] = row
         whole[: k + 1, k] = row
     return (
-        tuple(reported[k]['name'] for k in keep),
+        tuple(coordinates[k]['name'] for k in keep),
         np.array([float(plain['value'][k]) for k in keep]),
-        np.array([float(reported[k]['prior_std']) for k in keep]),
+        np.array([float(coordinates[k]['prior_std']) for k in keep]),
         whole[np.ix_(keep, keep)],
     )

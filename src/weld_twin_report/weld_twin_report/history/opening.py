@@ -43,9 +43,7 @@ def engine_of(address: Any) -> Engine:
     if address.drivername.startswith('postgresql+psycopg'):
         # Neither a server that does not answer nor somebody's forgotten lock is waited for in vain.
         patience = {'connect_timeout': CONNECT, 'options': f'-c lock_timeout={LOCKED}s'}
-        patience = {
-            key: reported for key, reported in patience.items() if key not in address.query
-        }
+        patience = {key: value for key, value in patience.items() if key not in address.query}
     made = sqlalchemy.create_engine(address, connect_args=patience, pool_pre_ping=not lite)
     if lite:
         # Python's driver begins late and ends at a CREATE; both would let others in between.

@@ -69,8 +69,8 @@ class Runs:
             if entry is None:
                 raise
             state = REFUSED if isinstance(error, Refused) else FAILED
-            reported = replace(run, state=state, sentence=str(error))
-            return reported if self._write(reported, None, patience) else None
+            failed = replace(run, state=state, sentence=str(error))
+            return failed if self._write(failed, None, patience) else None
 
     def _write(self, run: Run, entry: Entry | None, patience: float | None) -> bool:
         sql, runs = self._database.sql, self._database.table('runs')
@@ -83,11 +83,11 @@ class Runs:
             number = None
             if entry is not None:
                 number = self._database.put(connection, run.cell, entry)
-            reported = {**asdict(run), 'verdict_id': number}
+            values = {**asdict(run), 'verdict_id': number}
             # Another program may have written it since; only a failure is written over.
-            new = self._database.insert(runs).values(reported)
+            new = self._database.insert(runs).values(values)
             new = new.on_conflict_do_update(
-                index_elements=[runs.c.key], set_=reported, where=runs.c.state == FAILED
+                index_elements=[runs.c.key], set_=values, where=runs.c.state == FAILED
             )
             return bool(connection.execute(new).rowcount == 1)
 
@@ -163,8 +163,8 @@ class Runs:
         )
         if cell is not None:
             query = query.where(cells.c.name == cell)
-        reported = 'a row' if cell is None else f'the newest diagnosis of cell {cell!r}'
-        with self._database.reading(reported) as connection:
+        what = 'a row' if cell is None else f'the newest diagnosis of cell {cell!r}'
+        with self._database.reading(what) as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
 
     def look(self, cell: str, entries: Sequence[Entry] | None = None) -> list[dict[str, Any]]:
@@ -182,14 +182,14 @@ class Runs:
             return list(row.changes)
         entries = self._database.entries(cell, NEWEST) if entries is None else entries
         seen = observations(entries)
-        reported = [as_dict(change) for change in changed(entries, seen)]
-        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': reported}
+        changes = [as_dict(change) for change in changed(entries, seen)]
+        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': changes}
         new = self._database.insert(findings).values(new_row)
         new = new.on_conflict_do_update(index_elements=[findings.c.cell_id], set_=new_row)
         # Who may only read works it out anew.
         with suppress(Unavailable):
             self._database.write(lambda connection: connection.execute(new), patience=0.0)
-        return reported
+        return changes
 
     def _state(self, cell: str) -> tuple[int, int, int]:
         """Return the number of a cell, that of its last diagnosis, and how many it has."""

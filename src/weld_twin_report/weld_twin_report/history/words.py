@@ -137,13 +137,13 @@ def coordinate(name: str) -> Coordinate:
         return Coordinate('tool_pose', None, words, factor, unit)
     effect, *joint, number = name.split(' ')
     kind = REGISTRY.get(effect)
-    reported = [p for p in kind.parameters if p.differentiable] if kind else []
+    parameters = [p for p in kind.parameters if p.differentiable] if kind else []
     factor, unit = 1.0, ''
-    if reported:
-        parameter = reported[min(int(number), len(reported) - 1)]
+    if parameters:
+        parameter = parameters[min(int(number), len(parameters) - 1)]
         factor, unit = display_unit(parameter.name, parameter.unit)
     where, _, source = ' '.join(joint).partition('<')
-    one = len(reported) == 1 and number == '0'
+    one = len(parameters) == 1 and number == '0'
     words = cause(effect, where or None) + ('' if one else f', part {int(number) + 1}')
     words += f' from {source}' if source else ''
     return Coordinate(effect, where or None, words, factor, unit)
@@ -206,11 +206,11 @@ def forecast(
     }
 
 
-def forecast_sentence(change: Change, reported: Mapping[str, Any]) -> str:
+def forecast_sentence(change: Change, outlook: Mapping[str, Any]) -> str:
     """Return when the limit is reached, in words."""
     what = coordinate(change.name)
-    limit = f'{reported["limit"] * what.factor:g} {what.unit}'.rstrip()
-    low, high = reported['weeks_5'], reported['weeks_95']
+    limit = f'{outlook["limit"] * what.factor:g} {what.unit}'.rstrip()
+    low, high = outlook['weeks_5'], outlook['weeks_95']
     if low is None:
         return f'{what.words} does not come near {limit}.'
     if high == 0.0:

@@ -59,13 +59,13 @@ def on_what(diagnosis: Diagnosis) -> str:
 def judgement(rule: Rule, size: float) -> str:
     """Return the verdict on a largest deviation [m], and where it is open its limits."""
     verdict = rule.judged(size)
-    reported = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
+    words = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
     if verdict == OPEN and rule.tolerance_m is not None:
         low = rule.tolerance_m - rule.to_pass * rule.uncertainty_m
         high = rule.tolerance_m + rule.to_fail * rule.uncertainty_m
         passes = f'passes up to {millimetres(low)}' if low > 0.0 else 'nothing passes'
-        reported += f' ({passes}, fails above {millimetres(high)})'
-    return f'{reported[:1].upper()}{reported[1:]}'
+        words += f' ({passes}, fails above {millimetres(high)})'
+    return f'{words[:1].upper()}{words[1:]}'
 
 
 def rule_data(rule: Rule) -> dict[str, Any]:
@@ -144,8 +144,8 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
     for mended in switch_sets(diagnosis):
         remaining = remaining_with(diagnosis, mended)
         against = '' if set(mended) <= taken else ' (not advised)'
-        reported = f'{_mended_words(diagnosis, mended)}{against}'
-        out.append(_row(reported, remaining.rms_after, remaining.largest_after, rule))
+        name = f'{_mended_words(diagnosis, mended)}{against}'
+        out.append(_row(name, remaining.rms_after, remaining.largest_after, rule))
     return out
 
 
@@ -181,10 +181,10 @@ def mark(rule: Rule, size: float, before: str = '') -> Html:
     What stands ``before`` it is left out with it where no tolerance is given.
     """
     verdict = rule.judged(size)
-    reported = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
+    words = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
     return tag(
         'span',
-        reported,
+        words,
         class_=f'mark {verdict}',
         data_size=f'{1e3 * size:.9f}',
         data_before=before,

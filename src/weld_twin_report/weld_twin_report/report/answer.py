@@ -71,13 +71,13 @@ def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
         like = [site_name(site) for site, _ in family.like] if family.named else []
         name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
         without = f'{100.0 * family.growth:+.0f} %'
-        reported = [
+        cells = [
             millimetres(family.rms_m),
             without,
             ', '.join(joints[:_LARGEST]),
             ', '.join(like),
         ]
-        rows.append([name, *reported])
+        rows.append([name, *cells])
     return rows
 
 
@@ -224,10 +224,10 @@ class Answer:
         sure = [c.belief for c in self.causes if c.cause.name and c.belief is not None]
         if not sure or max(sure) < whole.confidence + _DIFFERS:
             return ''
-        reported = ', '.join(odds(p) for p in sure[:_LISTED])
+        each = ', '.join(odds(p) for p in sure[:_LISTED])
         if len(sure) == 1:
-            return f'. The cause alone, others or none beside it: {reported}'
-        return f'. All at once is less likely than each alone: {reported}'
+            return f'. The cause alone, others or none beside it: {each}'
+        return f'. All at once is less likely than each alone: {each}'
 
     # Shares of the squared gap: everywhere as finely as the finest of them needs.
 
@@ -239,9 +239,9 @@ class Answer:
         """Return a share in the words that all shares of this answer have."""
         return percent(share, self._places)
 
-    def share_of(self, reported: CauseAnswer) -> tuple[str, str]:
+    def share_of(self, item: CauseAnswer) -> tuple[str, str]:
         """Return the share of a cause and the ends of its interval."""
-        return ends_to(self._places, reported.cause.share, *reported.cause.share_ci90)
+        return ends_to(self._places, item.cause.share, *item.cause.share_ci90)
 
     @cached_property
     def remainder(self) -> tuple[tuple[str, float], ...]:

@@ -74,8 +74,8 @@ class CauseAnswer:
     @cached_property
     def name(self) -> str:
         """Return it as a heading."""
-        reported = cause_name(self.diagnosis, self.cause)
-        return f'{reported[:1].upper()}{reported[1:]}'
+        heading = cause_name(self.diagnosis, self.cause)
+        return f'{heading[:1].upper()}{heading[1:]}'
 
     @cached_property
     def effects(self) -> list[Effect]:
@@ -97,11 +97,11 @@ class CauseAnswer:
     def meaning(self) -> list[str]:
         """Return what is wrong, in plain words: of each name that it may have."""
         names = [site.effect for site in self.alike] or [e.name for e in self.effects]
-        reported = [REGISTRY[name].traits for name in dict.fromkeys(names)]
-        reported = [traits for traits in reported if traits.meaning]
-        if len(reported) < 2:
-            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in reported]
-        return [f'{each.title}: {each.meaning}.' for each in reported]
+        kinds = [REGISTRY[name].traits for name in dict.fromkeys(names)]
+        kinds = [traits for traits in kinds if traits.meaning]
+        if len(kinds) < 2:
+            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in kinds]
+        return [f'{each.title}: {each.meaning}.' for each in kinds]
 
     @property
     def _should_it_be(self) -> str:
@@ -145,15 +145,15 @@ class CauseAnswer:
     def _on(self) -> list[str]:
         if not self.cause.dependence:
             return ['What it depends on was not found.']
-        reported = leading(self.cause.dependence)
-        on = depending(*(name for name, _ in reported))
-        return [f'{odds(sum(p for _, p in reported))} that it {on}; what it is, is open.']
+        dependences = leading(self.cause.dependence)
+        on = depending(*(name for name, _ in dependences))
+        return [f'{odds(sum(p for _, p in dependences))} that it {on}; what it is, is open.']
 
     @cached_property
     def levels(self) -> str:
         """Return what is believed of place, dependence and name, each by itself."""
         at = str(self.cause.place[0][0]) if self.cause.place else ''
-        reported = {
+        levels = {
             'Place': [(place_name(a), p) for a, p in self.cause.place],
             'Depends on': [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
             # The place stands there already; other joints stand with their names.
@@ -165,7 +165,7 @@ class CauseAnswer:
         }
         each = '. '.join(
             f'{head}: {", ".join(f"{name} {odds(p)}" for name, p in items[:_LISTED])}'
-            for head, items in reported.items()
+            for head, items in levels.items()
             if items
         )
         return f'{each}. Learned for each level by itself.' if each else ''
@@ -179,17 +179,17 @@ class CauseAnswer:
             [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
             [(site_name(site), p) for site, p in self.cause.name if site.effect not in CURVES],
         )
-        reported = [', '.join(f'{n} ({odds(p)})' for n, p in items[:_LISTED]) for items in levels]
-        reported[-1] = 'none that was tried' if unnamed(self.cause) else reported[-1]
-        return [f'{value} ({ends})', *reported]
+        cells = [', '.join(f'{n} ({odds(p)})' for n, p in items[:_LISTED]) for items in levels]
+        cells[-1] = 'none that was tried' if unnamed(self.cause) else cells[-1]
+        return [f'{value} ({ends})', *cells]
 
     # How large it is, and what is left without it.
 
     @cached_property
     def off_by(self) -> list[str]:
         """Return by how much it is off, the most telling first; of those that fit alike, of one."""
-        reported = values(self.diagnosis, self.cause, self.effects)
-        return [f's{self._should_it_be}', *reported] if self.alike and reported else reported
+        amounts = values(self.diagnosis, self.cause, self.effects)
+        return [f's{self._should_it_be}', *amounts] if self.alike and amounts else amounts
 
     def off_in_short(self, most: int) -> list[str]:
         """Return the most telling of them, without radians, which the card has."""
@@ -198,10 +198,10 @@ class CauseAnswer:
     @cached_property
     def moved(self) -> list[np.ndarray]:
         """Return how it moves the tool at every stamp, (M, 3) [m], for each recording where known."""
-        reported = self.diagnosis.contributions
-        if reported is None or self.diagnosis.contacts is not None:
+        contributions = self.diagnosis.contributions
+        if contributions is None or self.diagnosis.contacts is not None:
             return []
-        return [parts[self.k] for parts in reported.parts]
+        return [parts[self.k] for parts in contributions.parts]
 
     @cached_property
     def own_square(self) -> float:
@@ -252,15 +252,15 @@ class CauseAnswer:
         if self.remaining is None:
             return None
         rms, rms_after, largest, largest_after = map(millimetres, self.remaining)
-        reported = (
+        change = (
             f'RMS {"falls" if self.remaining.rms_after < self.remaining.rms else "rises"} from '
             f'{rms} to {rms_after}, the largest '
             f'{"grows" if self.remaining.grows else "goes"} from {largest} to {largest_after}'
         )
         if not unnamed(self.cause):
-            return reported, ''
+            return change, ''
         short = taken_by_curve(self.diagnosis, self.k) is not None
-        return reported, f' {_BY_CURVE}{_SHORT * short}'
+        return change, f' {_BY_CURVE}{_SHORT * short}'
 
     # What to do about it.
 
@@ -282,19 +282,19 @@ class CauseAnswer:
         if self.diagnosis.families and len(effects) > 1:
             return [TOGETHER]
         if unnamed(self.cause):
-            reported = look_at(self.diagnosis, self.k)
+            steps = look_at(self.diagnosis, self.k)
         elif not effects:
             return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])
-            reported = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
+            steps = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
         if effects and self.alike:
             return [
                 f'Which of them it is must be measured first. S{self._should_it_be}',
-                *reported,
+                *steps,
             ]
-        return reported
+        return steps
 
     @property
     def _warning(self) -> str:
@@ -315,14 +315,14 @@ class CauseAnswer:
         if fault:
             return head, f'Nothing is to be entered: the curve {fault}.'
         others = against(self.diagnosis) if unnamed(self.cause) else ''
-        reported = self._correction
+        entry = self._correction
         if others:
             # A correction is made without the curves that are advised against.
             model = 'Its model is a copy of diagnosis.json'
-            reported += f' {model} without the entries of {others} under found.'
+            entry += f' {model} without the entries of {others} under found.'
         if self.alike:
-            reported = f'Nothing before it is known which it is. S{self._should_it_be} {reported}'
-        return head, reported
+            entry = f'Nothing before it is known which it is. S{self._should_it_be} {entry}'
+        return head, entry
 
     @property
     def where_to_enter(self) -> str:

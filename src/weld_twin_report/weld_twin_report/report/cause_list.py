@@ -59,8 +59,8 @@ def causes_cards(page: Content) -> Html | None:
     shown = big[:MOST]
     if not shown:
         return None
-    rest = [reported for reported in answer.causes if reported not in shown]
-    cards = [_card(answer, reported, rank) for rank, reported in enumerate(shown, 1)]
+    rest = [item for item in answer.causes if item not in shown]
+    cards = [_card(answer, item, rank) for rank, item in enumerate(shown, 1)]
     return section(
         'What causes it',
         _shares(answer, shown, rest),
@@ -75,7 +75,7 @@ def causes_cards(page: Content) -> Html | None:
 
 def _against(shown: list[CauseAnswer]) -> str:
     """Return how to read a share that is far smaller than what its cause moves."""
-    if all(reported.own_square < reported.cause.share + _APART for reported in shown):
+    if all(item.own_square < item.cause.share + _APART for item in shown):
         return ''
     return (
         ' Causes that move the tool at the same instants share what they explain together: a small '
@@ -86,88 +86,88 @@ def _against(shown: list[CauseAnswer]) -> str:
 def _shares(answer: Answer, shown: list[CauseAnswer], rest: list[CauseAnswer]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
     rows: list[Bar] = []
-    for rank, reported in enumerate(shown, 1):
-        value, ends = answer.share_of(reported)
-        label = f'{rank}. {cause_name(answer.diagnosis, reported.cause)}'
-        rows.append(Bar(label, reported.cause.share, f'{value} ({ends})', 'cause'))
-    smaller = sum(reported.cause.share for reported in rest)
+    for rank, item in enumerate(shown, 1):
+        value, ends = answer.share_of(item)
+        label = f'{rank}. {cause_name(answer.diagnosis, item.cause)}'
+        rows.append(Bar(label, item.cause.share, f'{value} ({ends})', 'cause'))
+    smaller = sum(item.cause.share for item in rest)
     if smaller > 0.0:
         rows.append(Bar('smaller causes', smaller, answer.percent(smaller), 'cause'))
     rows += [Bar(name, share, answer.percent(share), 'rest') for name, share in answer.remainder]
     return bars(rows, 'wide shares')
 
 
-def _card(answer: Answer, reported: CauseAnswer, rank: int) -> Html:
-    off = reported.off_by
+def _card(answer: Answer, item: CauseAnswer, rank: int) -> Html:
+    off = item.off_by
     more = [f'and {len(off) - _VALUES} more'] if len(off) > _VALUES else []
     entries: list[tuple[str, Child]] = [
-        ('What that is', lines(reported.meaning)),
-        ('How sure', _sure(reported)),
+        ('What that is', lines(item.meaning)),
+        ('How sure', _sure(item)),
         ('By how much', lines([*off[:_VALUES], *more])),
-        ('Stands on', reported.stands_on),
-        (_EFFECT[at_rest(answer.diagnosis)], _effect(reported)),
-        ('If only this is mended', _mended(reported, answer.rule)),
-        ('What to do', lines(joined(warned(text)) for text in reported.to_do)),
-        reported.at_the_controller,
+        ('Stands on', item.stands_on),
+        (_EFFECT[at_rest(answer.diagnosis)], _effect(item)),
+        ('If only this is mended', _mended(item, answer.rule)),
+        ('What to do', lines(joined(warned(text)) for text in item.to_do)),
+        item.at_the_controller,
     ]
     return tag(
         'article.card',
-        tag('h3', tag('span.rank', str(rank)), reported.name),
-        tag('p.share', tag('b', answer.percent(reported.cause.share)), ' of the gap'),
-        _box(reported),
-        _picture(reported),
+        tag('h3', tag('span.rank', str(rank)), item.name),
+        tag('p.share', tag('b', answer.percent(item.cause.share)), ' of the gap'),
+        _box(item),
+        _picture(item),
         pairs(entries),
         id_=f'cause-{rank}',
     )
 
 
-def _box(reported: CauseAnswer) -> Html | None:
+def _box(item: CauseAnswer) -> Html | None:
     """Return the switch that thinks this cause mended."""
-    for at, switch in enumerate(switches(reported.diagnosis)):
-        if switch.members == (reported.k,):
+    for at, switch in enumerate(switches(item.diagnosis)):
+        if switch.members == (item.k,):
             box = tag('input', type='checkbox', data_switch=at, checked='')
             return tag('label.one-switch', box, ' take as mended')
     return None
 
 
-def _sure(reported: CauseAnswer) -> Html | None:
+def _sure(item: CauseAnswer) -> Html | None:
     """Return how sure a cause is, and for engineers what each level of it is believed to be."""
-    levels = tag('summary', 'place, dependence and name'), reported.levels
-    folded = tag('details.detail', *levels) if reported.levels else None
+    levels = tag('summary', 'place, dependence and name'), item.levels
+    folded = tag('details.detail', *levels) if item.levels else None
     return (
-        tag('span.lines', *(tag('span', text) for text in reported.sure), folded)
-        if (reported.sure)
+        tag('span.lines', *(tag('span', text) for text in item.sure), folded)
+        if (item.sure)
         else None
     )
 
 
-def _effect(reported: CauseAnswer) -> Html | None:
-    if reported.moves is None:
+def _effect(item: CauseAnswer) -> Html | None:
+    if item.moves is None:
         return None
-    most, ways = reported.moves
+    most, ways = item.moves
     return joined([most, tag('span.detail', ways) if ways else None])
 
 
-def _mended(reported: CauseAnswer, rule: Rule | None) -> Html | None:
+def _mended(item: CauseAnswer, rule: Rule | None) -> Html | None:
     """Return the gap that would be left if only this were mended, and whether that passes."""
-    if reported.mended is None or reported.remaining is None or rule is None:
+    if item.mended is None or item.remaining is None or rule is None:
         return None
-    after, how = reported.mended
-    return joined([after, mark(rule, reported.remaining.largest_after, ', '), '.', how or None])
+    after, how = item.mended
+    return joined([after, mark(rule, item.remaining.largest_after, ', '), '.', how or None])
 
 
-def _picture(reported: CauseAnswer) -> Html | None:
+def _picture(item: CauseAnswer) -> Html | None:
     """Return how far the cause moves the tool along the recording, or its curve."""
-    diagnosis = reported.diagnosis
-    curve = furthest_off(diagnosis, reported.cause)
+    diagnosis = item.diagnosis
+    curve = furthest_off(diagnosis, item.cause)
     # A constant is one value, and no picture.
     if curve is not None and curve[1].over != 'constant':
         return curve_figure(diagnosis, *curve)
-    if reported.most is None:
+    if item.most is None:
         return None
-    run = reported.most[0]
+    run = item.most[0]
     index = drawn(diagnosis, run)
-    size = 1e3 * np.linalg.norm(reported.moved[run][index], axis=1)
+    size = 1e3 * np.linalg.norm(item.moved[run][index], axis=1)
     dots = static(diagnosis, run)
     return chart(
         'How far it moves the tool',
@@ -186,7 +186,7 @@ def _smaller(rest: list[CauseAnswer]) -> Html | None:
     return tag(
         'details.detail',
         tag('summary', counted(len(rest), 'smaller cause')),
-        table(LEVEL_HEADS, [reported.row for reported in rest], 'levels'),
+        table(LEVEL_HEADS, [item.row for item in rest], 'levels'),
     )
 
 
@@ -249,10 +249,10 @@ def changed_section(page: Content) -> Html | None:
     answer, changed = page.answer, page.answer.changed
     if changed is None:
         return None
-    reported = tag('p', answer.nothing_changed)
+    none = tag('p', answer.nothing_changed)
     return section(
         'What changed between the recordings',
-        table(changed.heads, changed.rows, 'changed') if changed.rows else reported,
+        table(changed.heads, changed.rows, 'changed') if changed.rows else none,
         id_='changed',
         lead=f'Against {answer.diagnosis.recordings[0].name}; the causes above are what all have in '
         'common.',
@@ -297,8 +297,8 @@ def _candidates(answer: Answer) -> Html | None:
     else:
         title = 'Candidates against each other'
         lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
-    reported = tag('p.note', f'{lead} {_BARS}')
-    return joined([tag('h3', title), reported, *parts, note])
+    intro = tag('p.note', f'{lead} {_BARS}')
+    return joined([tag('h3', title), intro, *parts, note])
 
 
 def _sets(answer: Answer) -> Html | None:
@@ -311,15 +311,15 @@ def _sets(answer: Answer) -> Html | None:
         guess = sentences(
             f'{names}: naming one of them would be a guess.' for names in answer.open
         )
-        reported = [guess, *([tag('p', 'Why:'), reasons] if diagnosis.reasons else [])]
+        parts = [guess, *([tag('p', 'Why:'), reasons] if diagnosis.reasons else [])]
     elif diagnosis.families:
-        reported = [reasons]
+        parts = [reasons]
     elif diagnosis.same:
-        reported = [sentences(same_words(diagnosis))]
+        parts = [sentences(same_words(diagnosis))]
     else:
         none = f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'
-        reported = [tag('p', none.rstrip())]
-    return joined([tag('h3', 'What these data cannot tell apart'), *reported])
+        parts = [tag('p', none.rstrip())]
+    return joined([tag('h3', 'What these data cannot tell apart'), *parts])
 
 
 def _absent(diagnosis: Diagnosis) -> Html | None:

@@ -111,7 +111,7 @@ def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     good = trusted(diagnosis, k)
     radial = _radial(circle, path, as_it_is(diagnosis, k))[good]
     name = diagnosis.recordings[k].name
-    reported = (
+    caption = (
         f'{name}: radius {millimetres(circle.radius)}, '
         f'{along(diagnosis, k)[-1]:.1f} s; as it is from {millimetres(float(radial.min()))} to '
         f'{millimetres(float(radial.max()))}, so {millimetres(float(np.ptp(radial)))} out of round'
@@ -120,7 +120,7 @@ def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     return tag(
         'figure',
         tag('canvas', data_circle=k, role='img', aria_label=label),
-        tag('figcaption', reported),
+        tag('figcaption', caption),
         _key(bool(diagnosis.model.found)),
     )
 
@@ -134,9 +134,7 @@ def _key(changes: bool) -> Html:
         ('ink', 'tick at the rim: a joint turns back there; the joint of a cause is named, a long '
          'name by its number from the base'),
     ]  # fmt: skip
-    items = [
-        tag('li', tag('i', class_=f'swatch {colour}'), ' ', reported) for colour, reported in rows
-    ]
+    items = [tag('li', tag('i', class_=f'swatch {colour}'), ' ', words) for colour, words in rows]
     return tag('ul.key', *items)
 
 

@@ -130,8 +130,8 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     off = _off(effect, sliding)
     # The makers' fields of a zero are angles; what a slide's count is not known.
     if kind in _ANYWHERE and (brand is None or (sliding and kind == 'zero')):
-        reported = _ANYWHERE[kind].format(**off)
-        return reported + (
+        step = _ANYWHERE[kind].format(**off)
+        return step + (
             '.' if brand else '; --controller with the name of its maker tells the menu.'
         )
     place = _PLACES.get(str(brand), {}).get(kind)

@@ -34,13 +34,13 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
     ``entry``: the content of correction.json.
     """
     title = f'{entry["program"]} · {entry["robot"]}'
-    reported = tolerance_sentences(entry)
+    tolerance = tolerance_sentences(entry)
     body = main(
         ('Corrected program ', entry['language']),
         title,
         headline(entry),
         _figures(entry),
-        section('Tolerance', sentences(reported), id_='tolerance') if reported else None,
+        section('Tolerance', sentences(tolerance), id_='tolerance') if tolerance else None,
         _first_run(entry),
         _left(entry),
         _outside(entry),
@@ -68,8 +68,8 @@ def tolerance_sentences(entry: Mapping[str, Any]) -> list[str]:
     """Return in sentences whether a tolerance is kept; nothing where none was asked for."""
     if 'tolerance' not in entry:
         return []
-    reported = entry['tolerance']
-    size, after = f'{reported["tolerance_m"] * 1e3:.3g} mm', reported['after']
+    tolerance = entry['tolerance']
+    size, after = f'{tolerance["tolerance_m"] * 1e3:.3g} mm', tolerance['after']
     decision = {
         'kept': 'it counts as kept',
         'not kept': 'it counts as not kept',
@@ -77,19 +77,19 @@ def tolerance_sentences(entry: Mapping[str, Any]) -> list[str]:
     }[after['decision']]
     out = [
         f'All along, the tool keeps within {size} of where the program means it with '
-        f'{reported["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
+        f'{tolerance["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
         f'after: {decision} (from 95 % on, with guard bands as ISO 14253-1). After, it is 95 % sure '
         f'to keep within {after["sure_within_m"] * 1e3:.3f} mm.'
     ]
     if after['decision'] == 'kept':
         return out
-    more = reported['postures_more']
+    more = tolerance['postures_more']
     if more is None:
         return [*out, 'No number of postures measured along it makes that sure with this model.']
     return [
         *out,
         f'{more} postures measured more along it make it 95 % sure: weld-twin investigate '
-        f'--tolerance {reported["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
+        f'--tolerance {tolerance["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
         f'--postures {more} says which.',
     ]
 
@@ -203,5 +203,5 @@ def _degrees(turn: float) -> str:
 def _notes(entry: Mapping[str, Any]) -> Html | None:
     if not entry['notes']:
         return None
-    reported = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
-    return section('What was assumed', reported, id_='notes')
+    notes = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
+    return section('What was assumed', notes, id_='notes')

@@ -125,7 +125,7 @@ def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
     return json_text(content)
 
 
-def _candidates(diagnosis: Diagnosis, reported: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _candidates(diagnosis: Diagnosis, entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """
     Return the candidates without effects that were asked to be left out.
 
@@ -136,6 +136,6 @@ def _candidates(diagnosis: Diagnosis, reported: list[dict[str, Any]]) -> list[di
     named = {site for group in diagnosis.indistinguishable for site in group}
     return [
         item if own in tried else {**item, 'excluded': True}
-        for own, item in zip(diagnosis.candidates, reported, strict=True)
+        for own, item in zip(diagnosis.candidates, entries, strict=True)
         if own in tried or own.site in named
     ]

@@ -80,9 +80,9 @@ def report_page(
         'rule': rule_data(rule),
         'circles': circle_data(diagnosis),
     }
-    reported = Html(renamed(embedded(data, 'data'), sheet.joints))
+    data_tag = Html(renamed(embedded(data, 'data'), sheet.joints))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
-    return document(title, main, reported, charts=True, scripts=scripts)
+    return document(title, main, data_tag, charts=True, scripts=scripts)
 
 
 def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
@@ -109,33 +109,33 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
 _PREFIX = re.compile(r'[A-Za-z]{1,3}')
 
 
-def joint_labels(reported: str, joints: Sequence[str]) -> dict[str, str]:
+def joint_labels(given: str, joints: Sequence[str]) -> dict[str, str]:
     """
     Return what each joint is called on the page.
 
-    reported: a prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML
+    given: a prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML
     file that gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
     joints: of the model, in chain order.
 
     Raises ModelError: it is neither, or the file names a joint that the robot does not have.
     """
-    if not reported:
+    if not given:
         return {}
-    if _PREFIX.fullmatch(reported):
-        return {name: f'{reported}{k}' for k, name in enumerate(joints, 1)}
-    path = Path(reported)
+    if _PREFIX.fullmatch(given):
+        return {name: f'{given}{k}' for k, name in enumerate(joints, 1)}
+    path = Path(given)
     if not path.is_file():
         raise ModelError(
-            f'--joint-names {reported}: give a prefix of one to three letters such as A, or a YAML '
+            f'--joint-names {given}: give a prefix of one to three letters such as A, or a YAML '
             'file with a line "joint: name" for each joint'
         )
     content = yaml.safe_load(path.read_text(encoding='utf-8'))
     if not isinstance(content, dict):
-        raise ModelError(f'{reported}: expected lines "joint: name", one for each joint')
+        raise ModelError(f'{given}: expected lines "joint: name", one for each joint')
     for name in content:
         if name not in joints:
             raise ModelError(
-                f'{reported}: the robot has no joint {name!r}; it has {", ".join(joints)}'
+                f'{given}: the robot has no joint {name!r}; it has {", ".join(joints)}'
             )
     return {str(name): str(label) for name, label in content.items()}
 

@@ -79,8 +79,8 @@ def _sites(diagnosis: Diagnosis) -> set[Site]:
 
 def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     """Return what to measure, why, and what it takes."""
-    reported = {'sentence', 'reason', *_APART}
-    rest = {key: value for key, value in wanted.items() if key not in reported}
+    known = {'sentence', 'reason', *_APART}
+    rest = {key: value for key, value in wanted.items() if key not in known}
     if wanted.get('motion'):
         rest['as a program'] = (
             'weld-twin export program next_experiment.yaml writes it in the language of the '
@@ -135,12 +135,10 @@ def _side(item: Mapping[str, Any], same: bool) -> str:
 
 def _left_open(answer: Answer, wanted: dict[str, Any]) -> list[Html]:
     """Return which open questions a measurement is not made for: motion may never part them."""
-    reported = 'It is not made to tell whether it is {}: see what to do first.'
+    words = 'It is not made to tell whether it is {}: see what to do first.'
     sets = zip(open_sets(answer.diagnosis), answer.open, strict=True)
     return [
-        tag('p.note', reported.format(names))
-        for group, names in sets
-        if not made_for(wanted, group)
+        tag('p.note', words.format(names)) for group, names in sets if not made_for(wanted, group)
     ]
 
 
@@ -257,15 +255,15 @@ def _stood_out(diagnosis: Diagnosis) -> str:
     open_ones = [c for level in ('unsound', 'warning', 'note') for c in diagnosis.checks
                  if c.level == level]  # fmt: skip
     fine = len(diagnosis.checks) - len(open_ones)
-    reported = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
+    words = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
     if len(open_ones) > _FINDINGS:
-        reported.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
-    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *reported])
+        words.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
+    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *words])
 
 
 def _files(inputs: Sequence[InputFile]) -> Html:
     """Return files, the start of their hashes, the version, and when it was printed."""
-    reported = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
-    more = [f'{len(reported) - _FILES} more'] if len(reported) > _FILES else []
-    named = '; '.join([*reported[:_FILES], *more, f'weld_twin {__version__}'])
+    words = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
+    more = [f'{len(words) - _FILES} more'] if len(words) > _FILES else []
+    named = '; '.join([*words[:_FILES], *more, f'weld_twin {__version__}'])
     return tag('span', named, tag('span#printed-at'))

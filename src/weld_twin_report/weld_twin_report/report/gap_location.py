@@ -67,12 +67,12 @@ def _places(answer: Answer) -> list[tuple[str, float, str]]:
     return _summed(answer, _at, place_name)
 
 
-def _at(reported: CauseAnswer) -> Sequence[tuple[str, float]]:
+def _at(item: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return the places of a cause; where several causes fit alike, theirs, and none is surer."""
-    known = [site for site in reported.alike if site.joint or site.effect in REGISTRY]
+    known = [site for site in item.alike if site.joint or site.effect in REGISTRY]
     own = [site.joint or REGISTRY[site.effect].traits.place for site in known]
     places = list(dict.fromkeys(place for place in own if place != 'joint'))
-    return [(place, HALF / len(places)) for place in places] or reported.cause.place
+    return [(place, HALF / len(places)) for place in places] or item.cause.place
 
 
 def _dependences(answer: Answer) -> list[tuple[str, float, str]]:
@@ -84,11 +84,11 @@ def _dependences(answer: Answer) -> list[tuple[str, float, str]]:
     return _summed(answer, _on, lambda on: words.get(on, on))
 
 
-def _on(reported: CauseAnswer) -> Sequence[tuple[str, float]]:
+def _on(item: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return what a cause depends on; where several causes fit alike, what each of them does."""
-    effects = [REGISTRY.get(site.effect) for site in reported.alike]
+    effects = [REGISTRY.get(site.effect) for site in item.alike]
     on = list(dict.fromkeys(effect.traits.depends_on for effect in effects if effect is not None))
-    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else reported.cause.dependence
+    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else item.cause.dependence
 
 
 def _summed(
@@ -98,9 +98,9 @@ def _summed(
 ) -> list[tuple[str, float, str]]:
     """Return shares by what is most probable of each cause; with the rest they make a whole."""
     sums: dict[str, float] = {}
-    for reported in answer.causes:
-        name = likely(beliefs(reported), word) or 'not found'
-        sums[name] = sums.get(name, 0.0) + reported.cause.share
+    for item in answer.causes:
+        name = likely(beliefs(item), word) or 'not found'
+        sums[name] = sums.get(name, 0.0) + item.cause.share
     rows = sorted(sums.items(), key=lambda item: -item[1])
     rows = [row for row in rows if row[1] >= SEEN] + list(answer.remainder)
     return [(name, share, answer.percent(share)) for name, share in rows]
@@ -115,12 +115,12 @@ def _whole(answer: Answer) -> str:
         return 'Nothing was named, so these are what each joint could explain by itself.'
     shares = [cause.share for cause in diagnosis.causes if not cause.rest]
     remaining = [cause.share for cause in diagnosis.causes if cause.rest]
-    reported, remaining = sum(shares or remaining), remaining if shares else []
+    explained, remaining = sum(shares or remaining), remaining if shares else []
     rows = [*(('without a name', share) for share in remaining), *answer.remainder]
     rest = [f'{answer.percent(share)} is {name}' for name, share in rows]
     subject = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
-        f'{subject} {answer.percent(reported)} of the squared gap; '
+        f'{subject} {answer.percent(explained)} of the squared gap; '
         f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
     )
 
@@ -217,11 +217,11 @@ def _worst(diagnosis: Diagnosis) -> Html | None:
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is None:
         return None
-    reported = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}'
+    words = f'RMS. The largest, {seen_at(diagnosis, k, sample, size)}'
     if sides := sides_words(parts[sample]):
-        reported += f': {sides}'
+        words += f': {sides}'
     keys = 'Left is as seen from the tool, looking along it; out is away from the flange.'
-    return tag('p.note', f'{reported}. {keys}')
+    return tag('p.note', f'{words}. {keys}')
 
 
 def _stretches(diagnosis: Diagnosis) -> Html | None:
@@ -234,9 +234,9 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     even = largest < _EVEN * max(min(sizes), 1e-12)
     strips: dict[int, list[Html]] = {}
     run, last = 0, path[0][0]
-    for reported in path:
-        run, last = _run_of(diagnosis, reported, run, last), reported[0]
-        strips.setdefault(run, []).append(_stretch(diagnosis, run, reported, largest, even))
+    for piece in path:
+        run, last = _run_of(diagnosis, piece, run, last), piece[0]
+        strips.setdefault(run, []).append(_stretch(diagnosis, run, piece, largest, even))
     where = _WHERE[at_rest(diagnosis)]
     spread = f'{millimetres(min(sizes))} to {millimetres(largest)} RMS'
     note = (
@@ -251,10 +251,10 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
 
 
 def _run_of(
-    diagnosis: Diagnosis, reported: tuple[float, float, float, float], run: int, last: float
+    diagnosis: Diagnosis, piece: tuple[float, float, float, float], run: int, last: float
 ) -> int:
     """Return the recording of a stretch, which follows one of a recording that began before."""
-    start, end = reported[:2]
+    start, end = piece[:2]
     stamps = diagnosis.traces.t
     for k in range(run + (start < last), len(stamps)):
         if stamps[k].size and stamps[k][0] <= start and end <= stamps[k][-1]:
@@ -265,11 +265,11 @@ def _run_of(
 def _stretch(
     diagnosis: Diagnosis,
     run: int,
-    reported: tuple[float, float, float, float],
+    piece: tuple[float, float, float, float],
     largest: float,
     even: bool,
 ) -> Html:
-    start, end, share, rms = reported
+    start, end, share, rms = piece
     most = rms >= largest and not even
     stamps = diagnosis.traces.t[run] if run < len(diagnosis.traces.t) else np.zeros(0)
     zero = float(stamps[0]) if stamps.size else 0.0

@@ -109,17 +109,17 @@ Figure = tuple[str, Child, Child]
 
 def figures(cells: Iterable[Figure]) -> Html:
     """Return the few large figures at the top of a page."""
-    reported = [
+    figures = [
         tag('div', tag('dt', name), tag('dd', value), tag('dd.note', note))
         for name, value, note in cells
     ]
-    return tag('dl.figures', *reported)
+    return tag('dl.figures', *figures)
 
 
 def pairs(rows: Iterable[tuple[str, Child]]) -> Html:
     """Return heads and what belongs to each; what is empty is left out."""
-    reported = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
-    return tag('dl.pairs', *reported)
+    parts = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
+    return tag('dl.pairs', *parts)
 
 
 def sentences(texts: Iterable[Child]) -> Html:
@@ -129,8 +129,8 @@ def sentences(texts: Iterable[Child]) -> Html:
 
 def lines(texts: Iterable[Child]) -> Html | None:
     """Return texts below each other in a cell; None without any."""
-    reported = [tag('span', text) for text in texts]
-    return tag('span.lines', *reported) if reported else None
+    spans = [tag('span', text) for text in texts]
+    return tag('span.lines', *spans) if spans else None
 
 
 def main(

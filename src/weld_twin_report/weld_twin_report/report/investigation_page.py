@@ -69,9 +69,9 @@ def _figures(state: Mapping[str, Any]) -> Html:
         r['asked'] for r in state['rounds'] if r['asked'] and r['asked']['decided'] is not None
     ]
     foreseen = [a['promise'] for a in judged if a.get('promise') is not None]
-    reported = 'experiments decided what they were to decide'
+    words = 'experiments decided what they were to decide'
     if foreseen:
-        reported += f'; {sum(foreseen):.1f} were foreseen'
+        words += f'; {sum(foreseen):.1f} were foreseen'
     cells: list[Figure] = [
         ('Belief', str(last['status']), '' if sure is None else f'{odds(sure)} sure'),
         (
@@ -79,7 +79,7 @@ def _figures(state: Mapping[str, Any]) -> Html:
             f'{state["spent_min"]:.1f}',
             f'of {state["budget_min"]:g} that may be spent on experiments',
         ),
-        ('Decided', f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}', reported),
+        ('Decided', f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}', words),
     ]
     return figures(cells)
 
@@ -132,11 +132,11 @@ def _file(item: Mapping[str, Any]) -> str:
 
 
 def _without_name(belief: Mapping[str, Any]) -> str:
-    reported = [
+    sides = [
         f'{item["share"]:.0%} of the gap at {place_name(item["at"])}, by {item["on"]}'
         for item in belief.get('causes') or []
     ]
-    return f'no name fits; {listed(reported)}' if reported else 'nothing named'
+    return f'no name fits; {listed(sides)}' if sides else 'nothing named'
 
 
 def _asked(step: Round, after: Round | None) -> Html:

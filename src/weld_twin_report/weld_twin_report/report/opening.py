@@ -75,7 +75,7 @@ def header(answer: Answer) -> Html:
 def opening(answer: Answer, judged: Html | None = None) -> Html:
     """Return status, verdict, how it is judged, figures, actions and the causes in a table."""
     first, second = answer.verdict
-    reported = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
+    parts = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
     return tag(
         'section#verdict',
         tag('p', answer.status, class_=f'status {answer.diagnosis.status}'),
@@ -83,7 +83,7 @@ def opening(answer: Answer, judged: Html | None = None) -> Html:
         tag('h1', first),
         tag('p.second', second),
         _mended(answer),
-        *(part(answer) for part in reported),
+        *(part(answer) for part in parts),
     )
 
 
@@ -107,8 +107,8 @@ def _holds(answer: Answer) -> Html | None:
     holds = answer.holds
     if holds is None:
         return None
-    reported = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
-    return tag('p', reported, class_='warn' if holds.wide else 'note')
+    text = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
+    return tag('p', text, class_='warn' if holds.wide else 'note')
 
 
 def _words(_: Answer) -> Html:
@@ -123,23 +123,23 @@ def figures(answer: Answer) -> Html:
     diagnosis = answer.diagnosis
     rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, answer.rule), _left(diagnosis)]
     if diagnosis.status in _SURE_OF:
-        reported = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
-        rows.append(('How sure', odds(diagnosis.confidence), reported))
+        words = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
+        rows.append(('How sure', odds(diagnosis.confidence), words))
     return drawn(filter(None, [*rows, _data(answer)]))
 
 
 def _off(diagnosis: Diagnosis) -> Figure:
     gap = diagnosis.gap
-    reported = (
+    words = (
         f'the gap: RMS of {counted(gap.samples, "sample")}. Measuring noise alone: '
         f'{millimetres(gap.noise_floor_m)}'
     )
     if gap.orientation_rms_rad is not None:
-        reported += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
+        words += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
         remaining = diagnosis.shrink.orientation_rad
         if remaining is not None and diagnosis.effects:
-            reported += f', with all mended by {small_turn(remaining[1])}'
-    return 'How far off', millimetres(gap.rms_m), reported
+            words += f', with all mended by {small_turn(remaining[1])}'
+    return 'How far off', millimetres(gap.rms_m), words
 
 
 def _worst(diagnosis: Diagnosis) -> Figure | None:
@@ -149,14 +149,14 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
         return None
     k, sample, _ = result
     when = instant(diagnosis, k, sample)
-    reported = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
+    words = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
     if len(diagnosis.recordings) > 1:
-        reported = f'{diagnosis.recordings[k].name}, {reported}'
-    reported += _place(diagnosis, k, sample)
+        words = f'{diagnosis.recordings[k].name}, {words}'
+    words += _place(diagnosis, k, sample)
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is not None and sides_words(parts[sample]):
-        reported += f': {sides_words(parts[sample])}'
-    return 'At the worst spot', millimetres(largest(diagnosis)), reported
+        words += f': {sides_words(parts[sample])}'
+    return 'At the worst spot', millimetres(largest(diagnosis)), words
 
 
 def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
@@ -170,15 +170,15 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
     if rule is None or diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     before, taken = largest(diagnosis), advised(diagnosis)
-    reported: list[Child] = ['as it is, on what was recorded']
+    words: list[Child] = ['as it is, on what was recorded']
     if taken or (diagnosis.effects and not switches(diagnosis)):
         after = remaining_with(diagnosis, taken).largest_after
-        reported.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
-        reported.append(mark(rule, after, _APART))
+        words.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
+        words.append(mark(rule, after, _APART))
     link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
     link = 'Write it here' if rule.tolerance_m is None else link
-    reported.append(joined(['. ', tag('a', link, href='#acceptance')]))
-    return 'May we weld with it', mark(rule, before), joined(reported)
+    words.append(joined(['. ', tag('a', link, href='#acceptance')]))
+    return 'May we weld with it', mark(rule, before), joined(words)
 
 
 def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
@@ -194,9 +194,9 @@ def _left(diagnosis: Diagnosis) -> Figure:
     if taken and len(taken) < len(every):
         remaining = remaining_with(diagnosis, taken)
         share = percent(remaining.rms_after / remaining.rms)
-        reported = f'RMS, {share} of the RMS gap, on data not used for fitting'
+        words = f'RMS, {share} of the RMS gap, on data not used for fitting'
         name = f'Left with {_which(diagnosis, taken)} mended'
-        return name, millimetres(remaining.rms_after), reported
+        return name, millimetres(remaining.rms_after), words
     mended = diagnosis.effects or every or not diagnosis.model.found
     name = 'Left with all mended' if mended else 'Left with what fits best'
     return name, millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
@@ -228,27 +228,27 @@ def _data(answer: Answer) -> Figure | None:
         return None
     counts = {level: sum(c.level == level for c in checks) for level in ('warning', 'note')}
     fine = len(checks) - sum(counts.values())
-    reported = [counted(n, level) for level, n in counts.items() if n]
+    notes = [counted(n, level) for level, n in counts.items() if n]
     if counts['warning']:
         about = [c.name.replace('_', ' ') for c in checks if c.level == 'warning']
-        reported[0] += f' ({listed(about)})'
+        notes[0] += f' ({listed(about)})'
     out, every = left_out(diagnosis)
     if out:
-        reported.append(f'{out} of {counted(every, "sample")} left out')
-    reported += _instrument(answer)
-    word = 'yes, see the notes' if reported else 'yes'
+        notes.append(f'{out} of {counted(every, "sample")} left out')
+    notes += _instrument(answer)
+    word = 'yes, see the notes' if notes else 'yes'
     word = 'see the warnings' if counts['warning'] else word
-    words = f'{passed(fine, len(checks))}{"; " if reported else ""}{"; ".join(reported)}. '
+    words = f'{passed(fine, len(checks))}{"; " if notes else ""}{"; ".join(notes)}. '
     return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
 
 
 def _instrument(answer: Answer) -> list[str]:
     """Return which cause sits with what measured, and how much of the gap that makes."""
     return [
-        f'but cause {k}, {answer.percent(reported.cause.share)} of the gap, sits at '
-        f'{likely(reported.cause.place)}'
-        for k, reported in enumerate(answer.causes[:_CAUSES], 1)
-        if {at for at, _ in leading(reported.cause.place)} & {'instrument', 'clock'}
+        f'but cause {k}, {answer.percent(item.cause.share)} of the gap, sits at '
+        f'{likely(item.cause.place)}'
+        for k, item in enumerate(answer.causes[:_CAUSES], 1)
+        if {at for at, _ in leading(item.cause.place)} & {'instrument', 'clock'}
     ]
 
 
@@ -258,7 +258,7 @@ def causes_table(answer: Answer) -> Html | None:
     causes = answer.causes[:_CAUSES]
     if not causes or rule is None or diagnosis.contacts is not None or diagnosis.families:
         return None
-    rows = [_row(answer, reported, rule) for reported in causes]
+    rows = [_row(answer, item, rule) for item in causes]
     if len(switches(diagnosis)) > 1:
         rows.append(_together(diagnosis, rule))
     top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
@@ -269,19 +269,19 @@ def causes_table(answer: Answer) -> Html | None:
     )
 
 
-def _row(answer: Answer, reported: CauseAnswer, rule: Rule) -> Html:
-    value, ends = answer.share_of(reported)
-    remaining = reported.remaining
+def _row(answer: Answer, item: CauseAnswer, rule: Rule) -> Html:
+    value, ends = answer.share_of(item)
+    remaining = item.remaining
     cells: list[Child] = [
         joined([tag('b', value), f' ({ends})']),
-        lines(reported.off_in_short(_VALUES)) or 'open',
-        lines(reported.sure) or 'not judged',
+        lines(item.off_in_short(_VALUES)) or 'open',
+        lines(item.sure) or 'not judged',
         'cannot be said: nothing that was tried stands for it'
         if remaining is None
         else _left_over(remaining.rms_after, remaining.largest_after, rule),
-        reported.where_to_enter,
+        item.where_to_enter,
     ]
-    first = tag('a', f'{reported.k + 1}. {reported.name}', href=f'#cause-{reported.k + 1}')
+    first = tag('a', f'{item.k + 1}. {item.name}', href=f'#cause-{item.k + 1}')
     with_heads = zip(_HEADS[1:], cells, strict=True)
     return tag(
         'tr',
@@ -291,18 +291,18 @@ def _row(answer: Answer, reported: CauseAnswer, rule: Rule) -> Html:
 
 
 def _left_over(rms: float, most: float, rule: Rule) -> Html:
-    reported = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
-    return joined(reported)
+    parts = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
+    return joined(parts)
 
 
 def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
     remaining = remaining_with(diagnosis, range(len(switches(diagnosis))))
-    reported = _left_over(remaining.rms_after, remaining.largest_after, rule)
+    cell = _left_over(remaining.rms_after, remaining.largest_after, rule)
     return tag(
         'tr',
         tag('th', 'All mended', scope='row'),
         *(tag('td.blank', '') for _ in range(3)),
-        tag('td', reported, data_head='If all are mended'),
+        tag('td', cell, data_head='If all are mended'),
         tag('td.blank', '')
         if len(advised(diagnosis)) == len(switches(diagnosis))
         else tag('td', 'not advised', data_head=_HEADS[-1]),
@@ -311,10 +311,10 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
 
 def _more(diagnosis: Diagnosis) -> Html:
     more = len(diagnosis.causes) - _CAUSES
-    reported: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
+    words: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
     count = len(switches(diagnosis))
     if count > 2:
         every = len(switch_sets(diagnosis)) == 2**count
         name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
-        reported += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
-    return joined([*reported, 'A click on a cause leads to its card.'])
+        words += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
+    return joined([*words, 'A click on a cause leads to its card.'])

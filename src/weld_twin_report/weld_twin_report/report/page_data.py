@@ -243,12 +243,12 @@ def rms_words(parts: Array) -> str:
 
 def sides_words(part: Array) -> str:
     """Return to which side and how far, in words; a part is (3,) [m]."""
-    reported = [
+    sides = [
         f'{millimetres(abs(float(value)))} {side[int(value < 0.0)]}'
         for value, side in zip(part, _SIDES, strict=True)
         if abs(value) >= _SEEN
     ]
-    return ', '.join(reported)
+    return ', '.join(sides)
 
 
 def worst(diagnosis: Diagnosis) -> tuple[int, int, float] | None:

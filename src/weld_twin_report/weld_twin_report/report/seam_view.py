@@ -104,16 +104,16 @@ def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
         if switches(diagnosis)
         else _after_words(diagnosis).capitalize()
     )
-    reported = [('before', 'As it is', 'Seam coloured by deviation as it is')]
+    sides = [('before', 'As it is', 'Seam coloured by deviation as it is')]
     if changes:
-        reported.append(('after', after, 'Seam coloured by deviation with causes mended'))
+        sides.append(('after', after, 'Seam coloured by deviation with causes mended'))
     return [
         tag(
             'figure',
             tag('figcaption', title, ', deviation ', tag('span.times'), ' larger'),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
-        for side, title, label in reported
+        for side, title, label in sides
     ]
 
 
@@ -179,10 +179,10 @@ def _left_out(diagnosis: Diagnosis, k: int) -> str:
         return ''
     size = np.linalg.norm(diagnosis.traces.before[k], axis=1)
     worst = sorted(out[np.argsort(-size[out])][:_LISTED].tolist())
-    reported = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
+    places = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
     if out.size > _LISTED:
-        reported.append(f'{out.size - _LISTED} more')
-    return f' ({counted(out.size, "sample")} left out: {listed(reported)})'
+        places.append(f'{out.size - _LISTED} more')
+    return f' ({counted(out.size, "sample")} left out: {listed(places)})'
 
 
 def _after_words(diagnosis: Diagnosis) -> str:

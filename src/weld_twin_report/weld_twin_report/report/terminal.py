@@ -45,7 +45,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
         return
     _print_found(answer, console)
     if diagnosis.status == 'unknown' and diagnosis.causes:
-        rows = [reported.row for reported in answer.causes[:_MOST]]
+        rows = [item.row for item in answer.causes[:_MOST]]
         _print_table(console, 'what is certain', LEVEL_HEADS, rows)
     elif sum(map(len, answer.alternatives)) > 1:
         rows = [list(other[:4]) for group in answer.alternatives for other in group]

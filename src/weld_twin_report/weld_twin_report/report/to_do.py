@@ -110,17 +110,17 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
     """Return what tells the open ones apart."""
     out = []
     for group in open_sets(diagnosis):
-        reported = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
+        words = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
         by = way(sorted({site.effect for site in group}))
         if by != ELSE:
-            out.append(f'{reported}: {by}.')
+            out.append(f'{words}: {by}.')
         elif diagnosis.contacts is not None or made_for(diagnosis.next_experiment, group):
             out.append(
-                f'{reported}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.'
+                f'{words}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.'
             )
         else:
             out.append(
-                f'{reported}: record other postures and motions than these, and diagnose all together.'
+                f'{words}: record other postures and motions than these, and diagnose all together.'
             )
     return out
 
@@ -153,14 +153,14 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
 
 def _looking(diagnosis: Diagnosis) -> list[str]:
     """Return where to look, and what to measure, while no cause has a name."""
-    reported = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
-    reported = [text for text in reported if text]
+    words = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
+    words = [text for text in words if text]
     if diagnosis.next_experiment is not None:
-        reported.append(
+        words.append(
             f'Measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}, and diagnose all '
             'together.'
         )
-    return reported
+    return words
 
 
 def _again(diagnosis: Diagnosis) -> list[str]:
@@ -194,8 +194,8 @@ def minutes(wanted: Mapping[str, Any] | None) -> str:
 
 
 def _takes(diagnosis: Diagnosis) -> str:
-    reported = minutes(diagnosis.next_experiment)
-    return f' ({reported})' if reported else ''
+    words = minutes(diagnosis.next_experiment)
+    return f' ({words})' if words else ''
 
 
 def _proposed(diagnosis: Diagnosis) -> str:
@@ -212,9 +212,9 @@ _NOT = re.compile(
 """What a reader is told not to do."""
 
 
-def warned(reported: str) -> list[Child]:
+def warned(text: str) -> list[Child]:
     """Return an action as markup: what not to do stands out, and degrees have their sign."""
-    parts = _NOT.split(_DEGREES.sub('°', reported))
+    parts = _NOT.split(_DEGREES.sub('°', text))
     return [tag('strong', text) if k % 2 else text for k, text in enumerate(parts) if text]
 
 
@@ -241,21 +241,21 @@ def untried(diagnosis: Diagnosis) -> str:
         for joint in joints if reason == REASON and not beside else ():
             still.setdefault(joint, []).append(cause(effect, None))
     asked = listed(not_to_be_tried(diagnosis))
-    reported = []
+    words = []
     if still:
         joints = [name for name in diagnosis.model.robot.joint_names if name in still]
         kinds = list(dict.fromkeys(kind for joint in joints for kind in still[joint]))
         more = [f'{len(kinds) - _KINDS} more'] if len(kinds) > _KINDS else []
         what = listed([*kinds[:_KINDS], *more])
         one = len(joints) == 1
-        reported.append(
+        words.append(
             f'{listed(joints)} hardly {"moves" if one else "move"}, so {what} could not be tried '
             f'there: only a recording in which {"it moves" if one else "they move"} can.'
         )
     if asked:
         verb = 'was' if len(not_to_be_tried(diagnosis)) == 1 else 'were'
-        reported.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
-    return ' '.join(reported)
+        words.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
+    return ' '.join(words)
 
 
 def weighed(diagnosis: Diagnosis) -> tuple[Candidate, ...]:

@@ -140,8 +140,8 @@ def protocol(doors: Doors) -> type[asyncio.Protocol]:
 
 def _client(transport: asyncio.Transport) -> Client:
     """Return address and port of the other side, as requests have them."""
-    reported = transport.get_extra_info('peername') or ('', id(transport))
-    return str(reported[0]), int(reported[1])
+    peer = transport.get_extra_info('peername') or ('', id(transport))
+    return str(peer[0]), int(peer[1])
 
 
 def _most_open() -> int:
@@ -232,13 +232,13 @@ class Access:
             await _refuse(send, 403, why)
             return
         query = scope.get('query_string', b'').decode('latin-1')
-        reported = [value for name, value in parse_qsl(query) if name == 'token']
-        right = [value for value in reported if self._is_token(value)]
+        tokens = [value for name, value in parse_qsl(query) if name == 'token']
+        right = [value for value in tokens if self._is_token(value)]
         if self._settings.token and not (right or self._known(headers, cookies)):
             await _refuse(send, 401, 'This server needs its token: open the address it printed.')
             return
         kept = [_cookie(TOKEN, right[0])] if right and self._settings.token else []
-        if reported and scope['method'] in ('GET', 'HEAD'):
+        if tokens and scope['method'] in ('GET', 'HEAD'):
             # The token must not stay where others read it: in the address, and in the history.
             await _send_on(send, _without_token(scope['path'], query), kept)
             return
@@ -269,8 +269,8 @@ class Access:
         bearer = headers.get('authorization', '').removeprefix('Bearer ')
         return self._is_token(bearer) or self._is_token(cookies.get(TOKEN, ''))
 
-    def _is_token(self, reported: str) -> bool:
-        return hmac.compare_digest(reported.encode(), self._settings.token.encode())
+    def _is_token(self, token: str) -> bool:
+        return hmac.compare_digest(token.encode(), self._settings.token.encode())
 
 
 def _name(host: str) -> str:
@@ -298,8 +298,8 @@ def _cookie(name: str, value: str, seconds: int = YEAR) -> bytes:
     jar: SimpleCookie = SimpleCookie()
     jar[name] = value
     # Lax: who follows a link from elsewhere is still himself. What changes something is checked.
-    reported = {'path': '/', 'httponly': 'yes', 'samesite': 'Lax', 'max-age': str(seconds)}
-    for key, how in reported.items():
+    attributes = {'path': '/', 'httponly': 'yes', 'samesite': 'Lax', 'max-age': str(seconds)}
+    for key, how in attributes.items():
         jar[name][key] = how
     return jar[name].OutputString().encode('latin-1')
 
@@ -321,8 +321,8 @@ def _with_headers(send: Send, cookies: list[bytes], scope: Scope, body: Body) ->
         if message['type'] == 'http.response.start':
             if message['status'] >= 400 and scope['method'] == 'POST':
                 await _drained(body)
-            reported = scope.get('cookies', cookies)  # an answer may say who the browser is
-            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in reported)]
+            own = scope.get('cookies', cookies)  # an answer may say who the browser is
+            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in own)]
             message = {**message, 'headers': [*message.get('headers', []), *more]}
         await send(message)
 

@@ -116,8 +116,8 @@ class _Site:
             robot = self._model_of(request, form, beside)
             if not (beside / DIAGNOSIS).is_file():
                 raise DataError('choose the diagnosis that it is to be corrected by, or drop one')
-            reported = {**form, 'robot': robot or form.get('robot', '')}
-            asked = asked_of_program(reported, sorted(file.name for file in beside.iterdir()))
+            asked_form = {**form, 'robot': robot or form.get('robot', '')}
+            asked = asked_of_program(asked_form, sorted(file.name for file in beside.iterdir()))
             await run_in_threadpool(self._queue.add, replace(job, names=names).ask(asked))
         return RedirectResponse(f'/recordings/{job.key}', 303)
 
@@ -318,10 +318,10 @@ def _files(form: FormData, name: str) -> list[UploadFile]:
 def _diagnosis_in(file: Path) -> dict[str, Any] | None:
     """Return a diagnosis; None where there is none that can be read."""
     try:
-        reported = json.loads(file.read_text(encoding='utf-8'))
+        content = json.loads(file.read_text(encoding='utf-8'))
     except (OSError, ValueError):
         return None
-    return reported if isinstance(reported, dict) else None
+    return content if isinstance(content, dict) else None
 
 
 def _written(job: Job, result: Path) -> list[str]:

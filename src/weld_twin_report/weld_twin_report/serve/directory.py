@@ -122,9 +122,9 @@ class Directory:
             ) from None
         except OSError:  # a file system without locks
             pass
-        reported = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
+        text = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
         os.ftruncate(self._lock_file, 0)
-        os.pwrite(self._lock_file, reported.encode(), 0)
+        os.pwrite(self._lock_file, text.encode(), 0)
 
 
 def _cut_off(name: str) -> bool:

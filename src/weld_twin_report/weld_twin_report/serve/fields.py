@@ -216,16 +216,16 @@ def _chosen(field: Field, text: str) -> str:
     return text
 
 
-def words(reported: Mapping[str, str], command: str) -> list[str]:
+def words(options: Mapping[str, str], command: str) -> list[str]:
     """Return the words of a command for the fields that it takes."""
     out = []
     for name, field in FIELDS.items():
-        if name in reported and command in field.commands and name not in LARGEST:
+        if name in options and command in field.commands and name not in LARGEST:
             option = (field.option or name).replace('_', '-')
-            values = reported[name].splitlines() if field.lines else [reported[name]]
+            values = options[name].splitlines() if field.lines else [options[name]]
             out += [f'--{option}={value}' for value in values]
-    if command == CORRECT and reported.keys() & LARGEST.keys():
-        sizes = [reported.get(name, size) + unit for name, (size, unit) in LARGEST.items()]
+    if command == CORRECT and options.keys() & LARGEST.keys():
+        sizes = [options.get(name, size) + unit for name, (size, unit) in LARGEST.items()]
         out += ['--max-correction', *sizes]
     return out
 

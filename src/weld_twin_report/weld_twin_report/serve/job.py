@@ -60,12 +60,12 @@ class Asked:
         unknown = data.keys() - own.keys() - FIELDS.keys() - {'told'}
         if unknown:
             raise DataError(f'it asks for {", ".join(sorted(unknown))}, which is not known')
-        reported = {**older, **data.get('told', {})}
-        texts = [own.get(name, '') for name in ('robot', 'cell', 'at')] + list(reported.values())
+        options = {**older, **data.get('told', {})}
+        texts = [own.get(name, '') for name in ('robot', 'cell', 'at')] + list(options.values())
         if not isinstance(own.get('apply', False), bool):
             raise DataError('it applies neither something nor nothing')
         _check_texts(texts)
-        return cls(**own, told=reported)
+        return cls(**own, told=options)
 
 
 @dataclass(frozen=True)
@@ -102,14 +102,14 @@ class Job:
                 raise ValueError('it is no file')
             data: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding='utf-8'))
             later = data.get('later')
-            reported = {
+            values = {
                 **data,
                 'names': tuple(data['names']),
                 'asked': Asked.read(data['asked']),
                 'later': Asked.read(later) if later else None,
                 'party': data.get('party') or data['user'],
             }
-            job = cls(**reported)
+            job = cls(**values)
             job._check(folder)
         except _DAMAGED as error:
             raise DataError(f"'{folder / FILE}' cannot be read: {error}") from None

@@ -146,11 +146,11 @@ def _field(name: str, title: str, hint: str, value: str = '') -> Html:
     return tag('div', _label(name, title, hint), entry)
 
 
-def _fields(names: Sequence[str], reported: Mapping[str, str]) -> list[Html]:
+def _fields(names: Sequence[str], values: Mapping[str, str]) -> list[Html]:
     """Return fields of the table, filled with what was given before."""
     out = []
     for name in names:
-        field, value = FIELDS[name], reported.get(name, '')
+        field, value = FIELDS[name], values.get(name, '')
         if field.choices:
             out.append(_choice(name, field.title, field.choices, value))
         elif field.lines:
@@ -181,12 +181,12 @@ def recordings_page(jobs: Sequence[Job], site: Site) -> str:
 
 
 def job_page(
-    job: Job, ahead: int, reported: Mapping[str, Any] | None, files: Sequence[str], site: Site
+    job: Job, ahead: int, diagnosis: Mapping[str, Any] | None, files: Sequence[str], site: Site
 ) -> str:
     """
     Return the page of a recording or program: its place, its progress, its question or its sheet.
 
-    So many come ahead of it; ``reported`` is its diagnosis.json, where there is one, and ``files`` may
+    So many come ahead of it; ``diagnosis`` is its diagnosis.json, where there is one, and ``files`` may
     be fetched.
     """
     if job.state in OPEN:
@@ -194,7 +194,7 @@ def job_page(
     if job.state == DONE:
         return page('verdict', *_result(job, files), site=site)
     if job.state == UNSOUND:
-        return page('unsound', *_question(job, reported or {}), site=site)
+        return page('unsound', *_question(job, diagnosis or {}), site=site)
     what = 'It could not be corrected' if job.kind == PROGRAM else 'It could not be diagnosed'
     what = 'One question first' if job.said == NO_ROBOT else what
     why = section(what, _said(job.said, job.command), id_='refused')
@@ -242,11 +242,11 @@ def _result(job: Job, files: Sequence[str]) -> tuple[Child, ...]:
     return (*out, _ask_again(job), _button('Delete it', f'{place}/delete'))
 
 
-def _question(job: Job, reported: Mapping[str, Any]) -> tuple[Child, ...]:
+def _question(job: Job, diagnosis: Mapping[str, Any]) -> tuple[Child, ...]:
     """Return what is wrong with data or set-up, and ask whether to correct it."""
     wrong = [
         joined
-        for each in reported.get('unsound') or []
+        for each in diagnosis.get('unsound') or []
         for joined in (
             _said(str(each['sentence'])),
             tag('p.note', sentence(str(each.get('remedy') or ''))),

@@ -246,8 +246,8 @@ async def save_program(
         raise DataError('choose a program first')
     models = _names(model, (*OTHERS, '.json'), 'a diagnosis nor a robot file', 2)
     await _write(uploads, names, place / title(names))
-    reported = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
-    await _write(model, reported, beside)
+    kept_as = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
+    await _write(model, kept_as, beside)
     return names
 
 
@@ -294,9 +294,9 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 
     ``names``: of the files dropped. Raises DataError: a field holds something that is no choice.
     """
-    reported = given(_texts(form), (IMPORT, DIAGNOSE))
+    options = given(_texts(form), (IMPORT, DIAGNOSE))
     tables = [name for name in names if name.lower().endswith(TABLES)]
-    if 'joint_signs' in reported and not tables:
+    if 'joint_signs' in options and not tables:
         raise DataError('signs are those of a table; the joints of a bag have their own')
     at, cell = _text(form, 'at'), _text(form, 'cell')[:CELL]
     if at:
@@ -304,7 +304,7 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     if not cell.isprintable():
         raise DataError("a cell's name has signs that cannot be shown")
     robot = _robot(form, [name for name in names if name.lower() != 'metadata.yaml'])
-    return Asked(robot, _text(form, 'apply') == 'yes', cell, at, reported)
+    return Asked(robot, _text(form, 'apply') == 'yes', cell, at, options)
 
 
 def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:

@@ -137,14 +137,14 @@ def _read(
     return out
 
 
-def _in_region(result: Diagnosis, reported: str, judged: Array) -> Diagnosis:
+def _in_region(result: Diagnosis, region: str, judged: Array) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
     from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 
     if result.posterior is None:
         return result
     sigma = corrected_sigma(result.posterior, result.model, judged)
-    return replace(result, posterior=replace(result.posterior, region=(reported, sigma)))
+    return replace(result, posterior=replace(result.posterior, region=(region, sigma)))
 
 
 def _changes(given: Given) -> dict[int, SetUpChange]:
@@ -177,8 +177,8 @@ def _described(recording: Recording, artefact: str) -> Recording:
     contacts = recording.contacts
     if not artefact or contacts is None:
         return recording
-    reported = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
-    return replace(recording, contacts=reported)
+    touched = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
+    return replace(recording, contacts=touched)
 
 
 def _bounded(recordings: Sequence[Recording]) -> list[Recording]:

@@ -243,11 +243,11 @@ class _Investigation:
         rounds = self.state['rounds']
         return (rounds[-1]['asked'] if rounds else None) or {'changes': ''}
 
-    def changes(self, reported: str = '') -> str:
+    def changes(self, given: str = '') -> str:
         """Return what was changed in the cell for the new bags: as reported, or as was asked."""
-        if not reported:
+        if not given:
             return str(self.asked.get('changes') or '')
-        return '' if reported == 'nothing' else str(set_up_change(reported))
+        return '' if given == 'nothing' else str(set_up_change(given))
 
     def plan_anew(self) -> None:
         """Keep another budget; where nothing is asked for, plan anew from what was recorded last."""

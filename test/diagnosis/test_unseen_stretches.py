@@ -10,11 +10,12 @@ import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.algebra.columns import Columns
+from weld_twin_core.diagnosis.algebra.columns import Columns, Maker
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.search import search
+from weld_twin_core.diagnosis.hypotheses.starts import started
 from weld_twin_core.diagnosis.levels.curved import carried
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
@@ -61,9 +62,12 @@ def refitted(unseen, kept, extra=None, ridge=0.0):
         columns = np.concatenate([columns, extra])
         root = np.concatenate([root, np.full(len(extra), np.sqrt(ridge))])
         wanted = np.concatenate([wanted, np.zeros(len(extra))])
-    out = target.copy()
+    out, found = target.copy(), target
     for b in np.unique(unseen.labels):
         seen = unseen.labels != b
+        anew = unseen.anew(b, kept)
+        target = found if anew is None else found - anew
+        out[~seen] = target[~seen]
         a = np.concatenate([columns[:, seen].T, np.diag(root)])
         x = np.linalg.lstsq(a, np.concatenate([target[seen], wanted]), rcond=None)[0]
         out[~seen] -= x @ columns[:, ~seen]
@@ -86,6 +90,58 @@ def test_further_columns_are_fitted_together_with_those_of_the_model(kept):
     found = unseen.base(kept).extended(extra, ridges)
     for ridge, residual in zip(ridges, found, strict=True):
         np.testing.assert_allclose(residual, refitted(unseen, kept, extra, ridge), atol=1e-7)
+
+
+@pytest.mark.parametrize('kept', [[1], [0, 1, 2], [0, 2]])
+@pytest.mark.parametrize('columns', [20, 230])
+def test_what_is_chosen_anew_without_a_stretch_predicts_it(columns, kept):
+    unseen, rng = made_up(columns, 5, seed=4, prior=30.0), np.random.default_rng(5)
+    moved = rng.normal(size=(5, unseen.labels.size))
+    unseen = replace(unseen, searched=lambda labels: {1: moved})
+    np.testing.assert_allclose(unseen.predict(kept), refitted(unseen, kept), atol=1e-7)
+    extra = rng.normal(size=(4, unseen.labels.size))
+    (found,) = unseen.base(kept).extended(extra, [0.3])
+    np.testing.assert_allclose(found, refitted(unseen, kept, extra, 0.3), atol=1e-7)
+
+
+def stairs_of(problem, model, scale):
+    """Return the fit of the staircase of the elbow that all rows choose."""
+    maker, joint = Maker(problem, problem.features(model), scale), 'elbow_joint'
+    pull = maker.moved(2).summed(problem.whitened(problem.residuals(model), scale))
+    seeds = maker.features[0].seeds(REGISTRY['quantization'], joint, pull)[0]
+    begun = [started(problem, model, scale, seed) for seed in seeds]
+    fits = [fit(problem, model.with_found((each,)), scale) for each in begun]
+    return min(fits, key=lambda one: one.rss)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_staircase_that_stations_chose_says_nothing_of_those_that_did_not(seed):
+    """Another axis leaks into the elbow; of thousands of staircases one looks like that."""
+    problem, model = tiny((), seed, noise=1e-6)
+    (recording,), scale = problem.recordings, known_scale(problem)
+    q = recording.joints.q.copy()
+    q[:, 2] += 3e-4 * np.sin(5.0 * q[:, 5] + 3.3)
+    leaked = Recording('leak', JointMotion(recording.joints.t, q, static=True))
+    poses = Twin(model.robot).poses(leaked, recording.measured.t)
+    seen = Measurements(recording.measured.t, poses.position, poses.rotation)
+    problem = replace(problem, recordings=(recording.with_measured(seen),))
+    found = stairs_of(problem, model, scale)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    assert unseen.rms(found.residual) < 0.95 * unseen.rms(unseen.bare)
+    assert unseen.rms(unseen.whole) > 0.98 * unseen.rms(unseen.bare)
+    assert unseen.wandered()[0] > 100.0
+
+
+@pytest.mark.parametrize('static', [True, False])
+def test_a_true_staircase_is_chosen_again_without_any_stretch(static):
+    true = effect('quantization', joint='elbow_joint', step=9e-4)
+    problem, model = tiny((true,), count=50 if static else 300, static=static)
+    scale = known_scale(problem)
+    found = stairs_of(problem, model, scale)
+    assert found.model.found[0].step == pytest.approx(9e-4, rel=1e-3)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    assert unseen.rms(unseen.whole) == pytest.approx(unseen.rms(found.residual), rel=1e-9)
+    assert unseen.wandered()[0] < 1.0
 
 
 def test_a_model_without_frames_and_effects_predicts_its_target():

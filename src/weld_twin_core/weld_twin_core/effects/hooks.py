@@ -293,6 +293,16 @@ class FitHooks(_Hooks):
         """Return whether a fit of it has to search for its start among its `starts`."""
         return type(self).starts is not FitHooks.starts
 
+    @property
+    def chosen(self) -> bool:
+        """
+        Return whether that search is all of it: no coordinate is left that a fit could turn.
+
+        Its displacement is then its one linear feature. Where data are left out in turn, it is
+        chosen anew without them.
+        """
+        return self.searched and not self.fitted()
+
 
 _GROUPS: dict[str, type[_Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
 """Groups of questions by the attribute of an effect that answers them."""

@@ -7,16 +7,18 @@ Stretches are those of time, or regions of posture: what carries over to the nex
 carry over to where the arm has not been.
 
 The found effects are small, so around the final fit every smaller model is linear: the exact
-contribution of each effect is put back into the residual where it is left out, and the coordinates of
-those kept are fitted anew on the other stretches. Normal equations of every stretch are formed once; a
-model is a choice of columns and targets. Where a seam or a SCARA hardly tells base from tool, fitted
-frames can be a metre off, and a metre times the turn of an effect that is left out would take that
-effect's place. So the columns of the frames are those of the arm without the effects.
+contribution of each effect is put back into the residual where it is left out, and the coordinates
+of those kept are fitted anew on the other stretches. What has no coordinates, but is chosen by a
+search, is chosen anew there, too: of thousands of staircases one fits anything it is chosen by.
+Normal equations of every stretch are formed once; a model is a choice of columns and targets. Where
+a seam or a SCARA hardly tells base from tool, fitted frames can be a metre off, and a metre times
+the turn of an effect that is left out would take that effect's place. So the columns of the frames
+are those of the arm without the effects.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import pairwise
@@ -29,6 +31,7 @@ from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
 from ..algebra.fit import TRUSTED, Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
+from ..hypotheses.starts import chosen_anew
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
 DAMPING = 1e-11
@@ -71,6 +74,9 @@ class Unseen:
     pull: Array
     """Prior precision of every column, and how hard it pulls from where the fit is now, shape
     (P,)."""
+    searched: Callable[[bytes], Mapping[int, Array]] = lambda labels: {}
+    """Returns what each effect that a search alone chooses takes off beyond what it takes off now
+    if it is chosen without each stretch, (stretches, rows) by its number; asked with the labels."""
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
@@ -104,6 +110,7 @@ class Unseen:
             taken=cache(partial(_taken, problem, scale, fit)),
             precision=prior + np.where(prior > 0.0, 0.0, tether),
             pull=prior * np.concatenate([off, fit.coordinates]),
+            searched=cache(partial(_searched, problem, scale, fit.model)),
         )
         fit.prepared[:] = [(precision, made)]
         return made
@@ -193,10 +200,12 @@ class Unseen:
         residual: Array = np.array(target)
         for b, rows in enumerate(self.spans):
             inverse = self._inverses[b]
-            step = inverse @ self._right(b, mix)
+            step = inverse @ self._right(b, mix, kept)
             if gone.size:
                 step -= inverse[:, gone] @ np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
             residual[rows] -= self.stretches[b].mixed(step)
+            if (moved := self.anew(b, kept)) is not None:
+                residual[rows] -= moved[rows]
         return residual
 
     @cached_property
@@ -214,13 +223,30 @@ class Unseen:
         """Return a model of some effects, fitted with each stretch left out in turn."""
         index, mix, target = self._asked(kept)
         solvers, residual = list[Solver](), target.copy()
-        for b, rows in enumerate(self.spans if index.size else ()):
+        for b, rows in enumerate(self.spans):
+            if (moved := self.anew(b, kept)) is not None:
+                residual[rows] -= moved[rows]
+            if not index.size:
+                continue
             solver = self._solver(b, index)
             whole = np.zeros(self.columns.count)
-            whole[index] = solver(self._right(b, mix)[index])
+            whole[index] = solver(self._right(b, mix, kept)[index])
             residual[rows] -= self.stretches[b].mixed(whole)
             solvers.append(solver)
-        return Base(self, index, target, solvers, residual)
+        return Base(self, kept, index, target, solvers, residual)
+
+    def anew(self, b: int, kept: Iterable[int]) -> Array | None:
+        """
+        Return what those effects that a search alone chooses take off beyond now, (rows,).
+
+        Chosen without one stretch; None where there is no such effect.
+        """
+        moved = [self._anew[k][b] for k in kept if k in self._anew]
+        return np.sum(moved, axis=0) if moved else None
+
+    @cached_property
+    def _anew(self) -> Mapping[int, Array]:
+        return self.searched(self.labels.astype(int).tobytes())
 
     def _solver(self, b: int, index: Index) -> Solver:
         """Return what solves the normal equations of some columns without one stretch."""
@@ -294,17 +320,27 @@ class Unseen:
         remaining[np.diag_indices_from(remaining)] += ROUNDED * np.diag(total)
         return np.asarray(remaining)
 
-    def _right(self, b: int, mix: Array) -> Array:
+    def _right(self, b: int, mix: Array, kept: Iterable[int]) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
         right = self._rights[b] @ mix if mix[1:].any() else self.rights_of_residual[b][:, 0]
+        if (moved := self.anew(b, kept)) is not None:
+            right = right - self.columns.times(self.but_for(b, moved))
         return np.asarray(right - self.pull)
+
+    def but_for(self, b: int, row: Array) -> Array:
+        """Return a row, shape (rows,), with zeros on one stretch."""
+        out = np.array(row)
+        out[self.spans[b]] = 0.0
+        return out
 
     def wandered(self) -> Array:
         """
         Return how far every effect's coordinates move as stretches are left out, shape (K,).
 
         Mean of the squared steps over what noise alone makes them; a formula that does not hold
-        wants other parameters on every stretch.
+        wants other parameters on every stretch. What a search alone chooses counts as a coordinate
+        that moves the tool as its choices do: of a coordinate fitted without one of B stretches
+        noise alone makes 1 / (B - 1) of a squared step, in noise.
         """
         every, mix = np.arange(self.columns.count), np.eye(1 + len(self.parts))[0]
         whole = _spread(self._total)
@@ -312,11 +348,21 @@ class Unseen:
         for b in range(len(self.spans)):
             remaining = self._system(b, every)
             system, size = unit_diagonal(remaining.copy(), DAMPING)
-            step = factored(system)(self._right(b, mix) / size) / size
+            step = factored(system)(self._right(b, mix, range(len(self.parts))) / size) / size
             more = np.maximum(_spread(remaining) - whole, ROUNDED * whole)
             ratios[b] = step**2 / np.maximum(more, 1e-300)
         reported = np.minimum(ratios, MOST_STEPS).mean(axis=0)
-        return np.array([reported[part].max(initial=0.0) for part in self.parts])
+        out = np.array([reported[part].max(initial=0.0) for part in self.parts])
+        for k, moved in self._anew.items():
+            out[k] = min((len(moved) - 1) * self._beside(moved).mean(), MOST_STEPS)
+        return out
+
+    def _beside(self, rows: Array) -> Array:
+        """Return the squares of rows, (R, rows), that no column of the model can take up, (R,)."""
+        system, size = unit_diagonal(self._total.copy(), DAMPING)
+        along = self.columns.products(rows) / size[:, None]
+        taken = (along * factored(system)(along)).sum(axis=0)
+        return np.asarray(np.maximum((rows**2).sum(axis=1) - taken, 0.0))
 
     def squares(self, residual: Array) -> Array:
         """
@@ -370,6 +416,7 @@ class Base:
     """A model fitted with each stretch left out in turn, ready to be given further columns."""
 
     unseen: Unseen
+    kept: Sequence[int]
     index: Index
     target: Array
     solvers: list[Solver]
@@ -412,6 +459,11 @@ class Base:
             cross, right = np.split(cross_all - crosses[b], [extra.shape[0]], axis=1)
             square, pull = np.split(square_all - squares[b], [extra.shape[0]], axis=1)
             right, pull = right[:, 0] - self.unseen.pull[self.index], pull[:, 0]
+            if (moved := self.unseen.anew(b, self.kept)) is not None:
+                others = self.unseen.but_for(b, moved)
+                right = right - self.unseen.columns.times(others)[self.index]
+                pull = pull - extra @ others
+                outs[:, rows] -= moved[rows]
             if self.index.size:
                 solved = self.solvers[b](np.column_stack([cross, right]))
                 square = square - cross.T @ solved[:, :-1]
@@ -434,6 +486,13 @@ def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
     without = (fit.model.without(k) for k in range(len(fit.model.found)))
     remaining = [problem.whitened(problem.residuals(model), scale) for model in without]
     return np.array(remaining).reshape(-1, fit.residual.size) - fit.residual
+
+
+def _searched(problem: Problem, scale: Scale, model: Model, labels: bytes) -> dict[int, Array]:
+    """Return what each effect that a search alone chooses takes off beyond now, by its number."""
+    parts = np.frombuffer(labels, dtype=int)
+    chosen = (k for k, effect in enumerate(model.found) if effect.fit.chosen)
+    return {k: chosen_anew(problem, model, scale, k, parts) for k in chosen}
 
 
 def _spread(normal: Array) -> Array:

@@ -47,7 +47,7 @@ for threads in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
 ROOT = Path(__file__).parents[1]
 ENGINE = 'weld_twin_core.diagnosis'
 TESTS = {
-    'test/diagnosis': 'kept_answers verdict standard_errors unseen_stretches swapped_rivals fit '
+    'test/diagnosis': 'kept_answers verdict standard_errors unseen_stretches swapped_alternatives fit '
     'atoms noise_and_interval learned_priors many_small_errors springs_at_rest evidence '
     'normal_equations definite impossible_effects steps_by_hand',
     'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '

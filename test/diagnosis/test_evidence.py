@@ -127,7 +127,9 @@ def test_what_the_model_has_is_not_counted_again():
     assert found[0].effect().offset == pytest.approx(expected, rel=1e-9)
     left = [y - b @ np.linalg.lstsq(b, y, rcond=None)[0] for b in (own.T, basis)]
     before, after = (r @ r for r in left)
-    assert found[0].nats == pytest.approx(evidence(before, before - after, 1.0, 700.0), rel=1e-9)
+    assert found[0].log_bayes == pytest.approx(
+        evidence(before, before - after, 1.0, 700.0), rel=1e-9
+    )
 
 
 def test_a_seed_found_among_many_pays_for_the_search():
@@ -135,4 +137,4 @@ def test_a_seed_found_among_many_pays_for_the_search():
     columns = rng.normal(size=(1, 200))
     y = 0.5 * columns[0] + rng.normal(size=200)
     free, searched = (best(columns, y, 200.0, trials) for trials in (1.0, 80.0))
-    assert free.nats - searched.nats == pytest.approx(np.log(80.0))
+    assert free.log_bayes - searched.log_bayes == pytest.approx(np.log(80.0))

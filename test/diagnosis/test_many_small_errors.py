@@ -148,7 +148,7 @@ def judged(families, gain=0.0, sure=0.0):
     weighed = weighed_families(found, unseen, Beliefs())
     return decide(
         Evidence(
-            slots=(),
+            candidate_sets=(),
             structure=loose,
             gap=4e-4,
             after=left,

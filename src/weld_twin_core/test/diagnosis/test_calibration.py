@@ -11,7 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.calibration.calibrated import Stated, Statement, calibrated, stated
 from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_situation, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
 from weld_twin_core.diagnosis.result import Cause, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.diagnosis.verdict.evidence import Evidence, Row
@@ -90,7 +90,7 @@ def test_a_share_counts_by_its_logarithm_and_only_what_cancels_is_bad_news(
     gain, parts, structure, cancelling
 ):
     evidence = Evidence(
-        slots=(),
+        candidate_sets=(),
         structure=Structure(1e-4, gain, 0.0, ()),
         gap=1e-3,
         after=1e-4,
@@ -115,21 +115,24 @@ class _Fit:
 
 def test_marginals_of_a_row_are_sums_over_who_shares_it():
     zero, gear = Site('joint_offset', 'wrist'), Site('gear_ratio', 'wrist')
-    slot = (
-        Rival(zero, 9.0, _Fit(0.0, 0.0), 0.5),
-        Rival(gear, 8.0, _Fit(1.0, 1.0), 0.3),
-        Rival(PLAY, 5.0, _Fit(3.0, 3.0), 0.18),
-        Rival(Site('drift', None), 2.0, _Fit(5.0, 5.0), 0.02),
+    candidate_set = (
+        Alternative(zero, 9.0, _Fit(0.0, 0.0), 0.5),
+        Alternative(gear, 8.0, _Fit(1.0, 1.0), 0.3),
+        Alternative(PLAY, 5.0, _Fit(3.0, 3.0), 0.18),
+        Alternative(Site('drift', None), 2.0, _Fit(5.0, 5.0), 0.02),
     )
-    row = Row.of(slot, wt.diagnosis.Beliefs())
+    row = Row.of(candidate_set, wt.diagnosis.Beliefs())
     assert row.listed == (zero, gear, PLAY)
     assert row.mass == pytest.approx(0.98)
     assert row.places()['wrist'] == pytest.approx(0.8)
     assert row.dependences() == pytest.approx(
         {'constant': 0.5, 'angle': 0.3, 'direction': 0.18, 'time': 0.02}
     )
-    assert row.leader.nats == 9.0
-    sure = (replace(slot[0], probability=0.9), *(replace(r, probability=0.03) for r in slot[1:]))
+    assert row.leader.log_bayes == 9.0
+    sure = (
+        replace(candidate_set[0], probability=0.9),
+        *(replace(r, probability=0.03) for r in candidate_set[1:]),
+    )
     row = Row.of(sure, wt.diagnosis.Beliefs())
     assert row.listed == (zero,)
 
@@ -153,7 +156,9 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
     imitating = [s for s in other.statements if s.kind == 'name']
     assert right.causes[0].probability == own.probability > 0.6
     # It is drawn from the evidence alone, and can be drawn anew.
-    table = tuple(Row.of(slot, wt.Beliefs()) for slot in right.evidence.slots)
+    table = tuple(
+        Row.of(candidate_set, wt.Beliefs()) for candidate_set in right.evidence.candidate_sets
+    )
     (again,) = stated(right.evidence, table, wt.Beliefs()).names
     assert again.probability == own.probability
     assert right.confidence == right.as_dict()['verdict']['learned'] > 0.5
@@ -164,8 +169,8 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
 
 def test_a_set_over_several_places_is_sure_of_none_of_them():
     zero, tilt = Site('joint_offset', 'wrist'), Site('gear_ratio', 'elbow')
-    slot = (Rival(zero, 9.0, _Fit(), 0.5), Rival(tilt, 9.0, _Fit(), 0.5))
-    row = Row.of(slot, wt.Beliefs())
+    candidate_set = (Alternative(zero, 9.0, _Fit(), 0.5), Alternative(tilt, 9.0, _Fit(), 0.5))
+    row = Row.of(candidate_set, wt.Beliefs())
     cause = Cause(
         tuple(row.places().items()),
         tuple(row.dependences().items()),
@@ -173,7 +178,7 @@ def test_a_set_over_several_places_is_sure_of_none_of_them():
         0.9,
         (0.8, 1.0),
         (0,),
-        slot=0,
+        row=0,
         effect=0,
     )
     names = (Statement('name', 0, {'size': 1.0, 'members': 2.0}, 0.9),)

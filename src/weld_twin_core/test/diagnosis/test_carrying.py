@@ -14,7 +14,7 @@ from small_arm import small_arm
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.diagnosis.unseen import held_out_shrink as room
 from weld_twin_core.diagnosis.unseen.held_out_shrink import borne_out
@@ -130,27 +130,29 @@ def fitted(*sites, left=0.0):
 
 @dataclass(frozen=True)
 class Found:
-    """A search of which only slots and fits are asked; one effect was refused, so none is exchanged."""
+    """Candidate sets and fits of a search; one effect was refused, so none is exchanged."""
 
-    slots: tuple
+    candidate_sets: tuple
     final: object = field(default_factory=lambda: fitted(TWIST))
     small: object = field(default_factory=lambda: fitted(TWIST, PLAY))
 
 
-def parted(monkeypatch, *slot):
-    """Return what is left of a slot, given sites, probabilities and what each leaves [m]."""
+def parted(monkeypatch, *candidate_set):
+    """Return what is left of a candidate set, given sites, probabilities and what each leaves [m]."""
     monkeypatch.setattr(room, 'left_on', lambda found, holdout, beliefs: found.final.left)
-    rivals = tuple(Rival(site, 0.0, fitted(site, left=left), p) for site, p, left in slot)
-    found = borne_out(Found((rivals,)), ['held out'], Beliefs())
-    return {r.site: r.probability for r in found.slots[0]}
+    alternatives = tuple(
+        Alternative(site, 0.0, fitted(site, left=left), p) for site, p, left in candidate_set
+    )
+    found = borne_out(Found((alternatives,)), ['held out'], Beliefs())
+    return {r.site: r.probability for r in found.candidate_sets[0]}
 
 
-def test_a_rival_that_fails_where_the_leader_holds_is_not_its_like(monkeypatch):
+def test_an_alternative_that_fails_where_the_leader_holds_is_not_its_like(monkeypatch):
     told = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.2, 1.06e-4), (PLAY, 0.2, 1e-4))
     assert told == pytest.approx({TWIST: 0.75, PLAY: 0.25})
 
 
-def test_a_rival_that_leaves_five_percent_more_is_still_alike(monkeypatch):
+def test_an_alternative_that_leaves_five_percent_more_is_still_alike(monkeypatch):
     told = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.4, 1.04e-4))
     assert told == {TWIST: 0.6, BASE: 0.4}
 
@@ -166,7 +168,13 @@ def test_what_looked_likelier_here_and_fails_there_is_out_however_sure_it_was(mo
 
 
 def test_a_sure_leader_and_a_diagnosis_without_held_out_data_are_not_asked():
-    slots = ((Rival(TWIST, 0.0, fitted(TWIST), 0.9), Rival(BASE, 0.0, fitted(BASE), 0.1)),)
-    assert borne_out(Found(slots), ['held out'], Beliefs()).slots == slots
-    unsure = Found(((Rival(TWIST, 0.0, fitted(TWIST), 0.6), Rival(BASE, 0.0, fitted(BASE), 0.4)),))
+    candidate_sets = (
+        (Alternative(TWIST, 0.0, fitted(TWIST), 0.9), Alternative(BASE, 0.0, fitted(BASE), 0.1)),
+    )
+    assert (
+        borne_out(Found(candidate_sets), ['held out'], Beliefs()).candidate_sets == candidate_sets
+    )
+    unsure = Found(
+        ((Alternative(TWIST, 0.0, fitted(TWIST), 0.6), Alternative(BASE, 0.0, fitted(BASE), 0.4)),)
+    )
     assert borne_out(unsure, [], Beliefs()) == unsure

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
 from weld_twin_core.diagnosis.result import Family, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import Left, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence, Scatter
@@ -24,10 +24,10 @@ GEAR, DRIFT = Site('gear_ratio', WRIST), Site('drift', None)
 FLOOR = 3.5e-5
 
 
-def slot(*pairs):
-    """Return an effect found with its rivals, from sites and probabilities."""
+def candidate_set(*pairs):
+    """Return an effect found with its alternatives, from sites and probabilities."""
     fit = SimpleNamespace(model=SimpleNamespace(found=()))
-    return tuple(Rival(site, 0.0, fit, probability) for site, probability in pairs)
+    return tuple(Alternative(site, 0.0, fit, probability) for site, probability in pairs)
 
 
 def left_over(gain, sure=9.0, names=('time',)):
@@ -39,25 +39,25 @@ def taking(left):
     return left_over(left * (1.0 - 0.09) / 0.25)
 
 
-def evidence(*slots, **changes):
+def evidence(*candidate_sets, **changes):
     """Return evidence of a large gap that is explained down to the floor."""
     usual = Evidence(
-        slots=slots,
+        candidate_sets=candidate_sets,
         structure=left_over(0.0, 0.0, ()),
         gap=1e-3,
         after=FLOOR,
         floor=FLOOR,
         independent=True,
-        parts=(1.0 / max(len(slots), 1),) * len(slots),
-        believed=(0.9,) * len(slots),
+        parts=(1.0 / max(len(candidate_sets), 1),) * len(candidate_sets),
+        believed=(0.9,) * len(candidate_sets),
     )
     return replace(usual, **changes)
 
 
-def structured(left, *slots, **changes):
+def structured(left, *candidate_sets, **changes):
     """Return evidence of which a structure takes that share of the squared gap above the floor."""
     return evidence(
-        *slots,
+        *candidate_sets,
         **{
             'structure': taking(left),
             'gap': 1e-3,
@@ -69,7 +69,7 @@ def structured(left, *slots, **changes):
     )
 
 
-SURE = slot((PLAY, 1.0))
+SURE = candidate_set((PLAY, 1.0))
 
 
 # Who is named -----------------------------------------------------------------------------------
@@ -80,23 +80,23 @@ SURE = slot((PLAY, 1.0))
     [(0.85, 'identified', (PLAY,)), (0.84, 'ambiguous', (PLAY, OFFSET))],
 )
 def test_a_leader_is_named_alone_from_85_percent_on(probability, status, named):
-    verdict = decide(evidence(slot((PLAY, probability), (OFFSET, 1.0 - probability))))
+    verdict = decide(evidence(candidate_set((PLAY, probability), (OFFSET, 1.0 - probability))))
     assert (verdict.status, verdict.sets) == (status, (named,))
 
 
 @pytest.mark.parametrize(('probability', 'listed'), [(0.031, True), (0.03, True), (0.029, False)])
-def test_a_rival_is_named_beside_an_unsure_leader_from_3_percent_on(probability, listed):
-    verdict = decide(evidence(slot((PLAY, 0.7), (OFFSET, 0.25), (DRIFT, probability))))
+def test_an_alternative_is_named_beside_an_unsure_leader_from_3_percent_on(probability, listed):
+    verdict = decide(evidence(candidate_set((PLAY, 0.7), (OFFSET, 0.25), (DRIFT, probability))))
     assert (DRIFT in verdict.sets[0]) is listed
 
 
 def test_a_set_begins_with_the_effect_of_fewest_numbers():
     base = Site('base_pose', None)
-    assert decide(evidence(slot((base, 0.7), (OFFSET, 0.3)))).sets == ((OFFSET, base),)
+    assert decide(evidence(candidate_set((base, 0.7), (OFFSET, 0.3)))).sets == ((OFFSET, base),)
 
 
 def test_what_cannot_be_told_apart_is_said_in_words():
-    verdict = decide(evidence(SURE, slot((OFFSET, 0.5), (GEAR, 0.5))))
+    verdict = decide(evidence(SURE, candidate_set((OFFSET, 0.5), (GEAR, 0.5))))
     assert len(verdict.reasons) == 1
     assert 'joint_offset of wrist_1_joint, gear_ratio of wrist_1_joint' in verdict.reasons[0]
 
@@ -106,7 +106,7 @@ def test_where_all_is_told_apart_no_reason_is_given():
 
 
 def test_beliefs_that_are_given_decide():
-    told = evidence(slot((PLAY, 0.9), (OFFSET, 0.1)))
+    told = evidence(candidate_set((PLAY, 0.9), (OFFSET, 0.1)))
     assert decide(told).status == 'identified'
     assert decide(told, Beliefs(sure=0.95)).status == 'ambiguous'
 
@@ -131,7 +131,7 @@ def test_a_name_counts_that_is_likelier_right_than_wrong(believed, status):
     ('parts', 'status'), [((0.6, 0.4), 'identified'), ((0.4, 0.6), 'unknown')]
 )
 def test_unlikely_names_make_a_gap_unknown_where_they_explain_more_than_the_others(parts, status):
-    pair = SURE, slot((OFFSET, 1.0))
+    pair = SURE, candidate_set((OFFSET, 1.0))
     verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=parts))
     assert verdict.status == status
     assert verdict.sets == ((PLAY,),)
@@ -140,7 +140,7 @@ def test_unlikely_names_make_a_gap_unknown_where_they_explain_more_than_the_othe
 
 @pytest.mark.parametrize(('nameless', 'status'), [(0.5, 'identified'), (0.51, 'unknown')])
 def test_a_gap_is_unknown_where_a_cause_without_a_name_is_likelier_than_not(nameless, status):
-    pair = SURE, slot((OFFSET, 1.0))
+    pair = SURE, candidate_set((OFFSET, 1.0))
     verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=(0.9, 0.1), nameless=nameless))
     assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
     alone = decide(evidence(SURE, nameless=nameless))
@@ -170,7 +170,7 @@ def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motio
     joint, after, sets, status
 ):
     """It leaves the cause unknown where it is more of the gap than what is named."""
-    both = SURE, slot((OFFSET, 1.0))
+    both = SURE, candidate_set((OFFSET, 1.0))
     noisy = Scatter(joint, 0.79, 13.0)
     verdict = decide(evidence(*both, gap=1e-3, after=after, floor=1e-4, scattered=(noisy,)))
     assert (verdict.status, verdict.sets) == (status, sets)
@@ -186,7 +186,7 @@ def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motio
 
 @pytest.mark.parametrize('left', [0.6, 0.9])
 def test_what_is_found_stays_told_beside_what_is_left(left):
-    pair = slot((OFFSET, 0.5), (GEAR, 0.5))
+    pair = candidate_set((OFFSET, 0.5), (GEAR, 0.5))
     told = structured(left, SURE, pair, parts=(0.01, 0.5), gap=0.6e-3, after=0.55e-3)
     verdict = decide(told)
     assert verdict.status == 'unknown'
@@ -195,11 +195,13 @@ def test_what_is_found_stays_told_beside_what_is_left(left):
 
 def test_what_no_machine_has_or_was_taken_out_is_told_first_of_what_is_unknown():
     mass = 'payload with mass -10.5 kg'
-    verdict = decide(evidence(slot((PLAY, 0.99)), refused=(mass,), believed=(0.3,)))
+    verdict = decide(evidence(candidate_set((PLAY, 0.99)), refused=(mass,), believed=(0.3,)))
     assert (verdict.status, verdict.sets) == ('unknown', ())
     assert mass in verdict.reasons[0]
     assert decide(evidence(refused=(mass,))).status == 'unknown'
-    lacking = evidence(slot((PLAY, 0.99)), lacking=('friction of elbow',), believed=(0.3,))
+    lacking = evidence(
+        candidate_set((PLAY, 0.99)), lacking=('friction of elbow',), believed=(0.3,)
+    )
     assert 'friction of elbow' in decide(lacking).reasons[0]
 
 
@@ -214,7 +216,7 @@ def test_without_an_effect_a_twentieth_may_stay_unexplained(left, status):
 def test_the_number_of_causes_alone_says_nothing_against_them():
     sites = [Site('link_length', f'joint_{k}') for k in range(8)]
     for count in range(1, 9):
-        verdict = decide(evidence(*(slot((site, 1.0)) for site in sites[:count])))
+        verdict = decide(evidence(*(candidate_set((site, 1.0)) for site in sites[:count])))
         assert verdict.status == 'identified'
         assert verdict.sets == tuple((site,) for site in sites[:count])
 

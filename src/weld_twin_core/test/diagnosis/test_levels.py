@@ -179,9 +179,9 @@ def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
 )
 def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
-    rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
+    alternative = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
     nothing = Verdict('none')
-    verdict = no_noise(nothing, rival, Beliefs())
+    verdict = no_noise(nothing, alternative, Beliefs())
     assert verdict.status == status
     assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
 
@@ -314,7 +314,7 @@ def test_what_is_far_wider_than_noise_is_told_as_above_it():
 def test_what_is_left_beside_a_model_has_a_place_where_no_curve_explains_the_gap():
     rest = {('elbow', 'angle'): 0.6, ('wrist', 'angle'): 0.1}
     evidence = Evidence(
-        slots=(),
+        candidate_sets=(),
         structure=Structure(5e-5, 0.6, 5.0, ('angle at elbow', 'angle at wrist'), of_rest=rest),
         gap=3e-4,
         after=8e-5,

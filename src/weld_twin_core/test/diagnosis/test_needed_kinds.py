@@ -86,7 +86,7 @@ def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1,
     rest = [name for name in REGISTRY if name not in KINDS]
     few = search(problem, start, [*rest, *KINDS], Beliefs(), lambda text: None)
     fit, scale, precision = many_small(problem, start, rest, Beliefs(), lambda text: None)
-    many = replace(few, final=fit, scale=scale, precision=precision, slots=(), dense=True)
+    many = replace(few, final=fit, scale=scale, precision=precision, candidate_sets=(), dense=True)
     unseen = Unseen.of(problem, scale, fit, precision)
     families = weighed_families(many, unseen, Beliefs())
     return {f.effect: f for f in families if f.missed(Beliefs().family_worth)}

@@ -27,13 +27,13 @@ class Beliefs:
 
     # Which effects are found -----------------------------------------------------------------
 
-    enter_nats: float = 6.0
-    """Evidence (a log Bayes factor, in nats) that an effect must be worth to enter and to stay: about
-    400 to 1, for a hundred or so candidates of which any may enter by chance."""
+    enter_log_bayes: float = 6.0
+    """Log Bayes factor that an effect must be worth to enter and to stay: about 400 to 1,
+    for a hundred or so candidates of which any may enter by chance."""
 
-    close_nats: float = 8.0
-    """Evidence [nats] below the best within which a candidate is fitted as well: the linear
-    ranking is a quadratic expansion, and misjudges a response that bends by a few nats."""
+    close_log_bayes: float = 8.0
+    """Log Bayes factor below the best within which a candidate is fitted as well: the linear
+    ranking is a quadratic expansion, and misjudges a response that bends."""
 
     close_share: float = 0.15
     """The same as a share of the best: what the ranking misjudges grows with the effect."""
@@ -57,14 +57,14 @@ class Beliefs:
     misfit_directions: float = 30.0
     """Number of directions among all columns that such a misfit spreads over. A judgement."""
 
-    rival_nats: float = 15.0
-    """Evidence [nats] below the best within which another effect is fitted as a rival."""
+    alternative_log_bayes: float = 15.0
+    """Log Bayes factor below the best within which another effect is fitted as an alternative."""
 
-    rival_share: float = 0.35
+    alternative_share: float = 0.35
     """The same as a share of the best."""
 
     temperature: float = 2.0
-    """Evidence between rivals is divided by this: real physics is a little richer than any model
+    """Evidence between alternatives is divided by this: real physics is a little richer than any model
     compared, so a nat is worth half of what it counts. A judgement."""
 
     # Many small errors at once ---------------------------------------------------------------
@@ -122,8 +122,8 @@ class Beliefs:
     another set-up. A judgement."""
 
     parted: float = 0.05
-    """Share by which a rival may leave more on held-out recordings than the effect in the model and
-    still count as its like. Two errors told apart by less are the same to who uses the model."""
+    """Share by which an alternative may leave more on held-out recordings than the effect in the
+    model and still count as its like. Two errors told apart by less are one to a user."""
 
     farthest: float = 1.0
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
@@ -135,7 +135,7 @@ class Beliefs:
     """Share of the evidence from which on one name stands alone; not the `sure` of an answer."""
 
     listed: float = 0.03
-    """Probability from which on a rival is named beside a leader that is not sure."""
+    """Probability from which on an alternative is named beside a leader that is not sure."""
 
     unexplained: float = 0.05
     """Share of the squared gap that may stay unexplained before it is told as something left, and

@@ -208,7 +208,7 @@ def _told(
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     families = weighed_families(result, unseen, beliefs) if result.dense else None
     evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs)
-    table = tuple(Row.of(slot, beliefs) for slot in result.slots)
+    table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
     verdict = decide(evidence, beliefs)

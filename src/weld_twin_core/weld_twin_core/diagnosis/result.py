@@ -250,7 +250,7 @@ class Cause:
     """Its index in `Diagnosis.effects` and in `Diagnosis.indistinguishable`."""
     rest: bool = False
     """Whether it is what is left beside everything that is told; its share is the unexplained."""
-    slot: int | None = None
+    row: int | None = None
     """Which effect found by the search it is; for the steps of a diagnosis alone."""
 
     def as_dict(self) -> dict[str, Any]:

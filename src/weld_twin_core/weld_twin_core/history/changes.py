@@ -35,7 +35,7 @@ MOST = 8
 """Changes looked for; an arm with more of them was rebuilt."""
 _ALIKE = 6.0
 """Sum of squares by which another coordinate may explain less and still be reported as alike:
-three nats, odds of twenty to one."""
+a log Bayes factor of three, twenty to one."""
 _DATED = 3.84
 """Fall within which another instant is as likely: 95 % of chi-square with one degree of freedom."""
 _SEASON_SPAN = 0.5
@@ -47,7 +47,7 @@ _LIKELY = 3.0
 """Log Bayes factor by which a coordinate that use can change goes before others: twenty to one."""
 _FRESH = 6.0
 """By how much more a step before the last diagnosis has to explain: its noise is new in every look, that
-of earlier steps was looked at before. Three nats; a large step is reported at once all the same."""
+of earlier steps was looked at before. A large step is reported at once all the same."""
 _ALARMS = 12.0 / 52.0
 """
 False alarms allowed in one look, were all that is tried independent. It is not: steps a week apart
@@ -81,7 +81,7 @@ class Change:
     size: float
     std: float
     """Height of a step, rise of a trend in a day, half the swing of a season; SI units."""
-    nats: float
+    log_bayes: float
     """By how much it is more likely than no change."""
     alike: tuple[str, ...] = ()
     """Other coordinates whose change would explain the same."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.effects.registry import effects_from_list
 from weld_twin_core.recording import Recording
@@ -155,10 +155,12 @@ def _members(diagnosis: Diagnosis, remaining: Any) -> list[list[dict[str, Any]]]
     """Return what each member of every set leaves in its place, the rest as it is."""
     if not isinstance(diagnosis.evidence, Evidence) or diagnosis.families:
         return []
-    by_site = {r.site: r for candidate_set in diagnosis.evidence.slots for r in candidate_set}
+    by_site = {
+        r.site: r for candidate_set in diagnosis.evidence.candidate_sets for r in candidate_set
+    }
     out = []
     for group in diagnosis.indistinguishable:
-        rivals: Sequence[Rival] = [by_site[site] for site in group if site in by_site]
+        alternatives: Sequence[Alternative] = [by_site[site] for site in group if site in by_site]
         out.append(
             [
                 {
@@ -166,12 +168,12 @@ def _members(diagnosis: Diagnosis, remaining: Any) -> list[list[dict[str, Any]]]
                     'joint': r.site.joint,
                     'left': remaining(_for_one(diagnosis.model, r.fit.model)),
                 }
-                for r in rivals
+                for r in alternatives
             ]
         )
     return out
 
 
 def _for_one(model: Model, other: Model) -> Model:
-    """Return a rival's model with the base of the first recording."""
+    """Return an alternative's model with the base of the first recording."""
     return replace(other, bases=other.bases[:1], known=model.known)

@@ -157,7 +157,7 @@ def with_an_alias():
     return one_cause(case, name=names, probability=0.64)
 
 
-def rivals(case, *each):
+def fit_alternatives(case, *each):
     return replace(
         case,
         candidates=tuple(Candidate(Site(name, 'joint_a1'), p, 1e-4, s) for name, p, s in each),
@@ -352,14 +352,14 @@ CASES = {
         'parts a name from a place': lambda: parts(
             ('backlash', 'joint_a2', 'direction'), ('joint_curve', 'joint_a3', 'speed')
         ),
-        'bars of rivals have one scale': lambda: rivals(
+        'bars of rivals have one scale': lambda: fit_alternatives(
             CIRCLE, ('servo_lag', 0.9, 0.8), ('friction', 0.1, 0.5), ('joint_offset', 1.0, 0.2)
         ),
         'zeros against each other': zeros_against_each_other,
     },
     'ambiguous': {
         'one error under two names': with_an_alias,
-        'rivals against each other': lambda: rivals(
+        'rivals against each other': lambda: fit_alternatives(
             OPEN,
             ('joint_offset', 0.49, 0.5),
             ('axis_parallelism', 0.48, 0.5),

@@ -232,7 +232,7 @@ def as_dict(change: Change) -> dict[str, Any]:
         'slowly_since': None if change.since is None else date(change.since),
         'size': change.size,
         'std': change.std,
-        'nats': change.nats,
+        'nats': change.log_bayes,
         'alike': list(change.alike),
         'sentence': sentence(change),
     }

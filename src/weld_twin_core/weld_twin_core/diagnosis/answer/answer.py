@@ -20,8 +20,8 @@ from ..calibration.calibrated import Stated, calibrated
 from ..calibration.features import of_form
 from ..frames.aligned import NOT_TOLD, other_causes
 from ..frames.changes import told, untold
+from ..hypotheses.alternatives import Alternative
 from ..hypotheses.any_motion import never_parted
-from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..levels.causes import causes, contributions
 from ..levels.curved import Curved
@@ -205,9 +205,9 @@ def _traces(result: Search) -> Traces:
 
 
 def _weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, ...]:
-    """Return the hypotheses for every slot, those of the strongest effect first."""
+    """Return the hypotheses for every candidate set, those of the strongest effect first."""
     out = []
-    for candidate_set in evidence.slots:
+    for candidate_set in evidence.candidate_sets:
         least = _position_rms(result, candidate_set[0])
         for alternative in candidate_set:
             rms = evidence.after * _position_rms(result, alternative) / max(least, 1e-300)
@@ -216,8 +216,8 @@ def _weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, 
     return tuple(out)
 
 
-def _position_rms(result: Search, alternative: Rival) -> float:
-    """Return the RMS position residual of a rival's fit, weighted, [m]."""
+def _position_rms(result: Search, alternative: Alternative) -> float:
+    """Return the RMS position residual of an alternative's fit, weighted, [m]."""
     parts = result.work.problem.by_sample(alternative.fit.residual)
     total = sum(float((part[:, :3] ** 2).sum()) for part in parts)
     count = sum(result.work.problem.samples)

@@ -200,8 +200,8 @@ def with_intervals(
     Where the status is unknown, or curves or many small errors stand for the causes, intervals are
     those that stretches tell.
     """
-    curved = len(result.slots) != len(unseen.parts)
-    if verdict.status == 'unknown' or curved or not any(result.slots) or not unseen.parts:
+    curved = len(result.candidate_sets) != len(unseen.parts)
+    if verdict.status == 'unknown' or curved or not any(result.candidate_sets) or not unseen.parts:
         return tuple(covering(cause) for cause in reported)
     tries = _tries(result, unseen, floor)
     return tuple(

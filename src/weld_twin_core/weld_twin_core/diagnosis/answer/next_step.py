@@ -46,10 +46,10 @@ _EVEN = 0.5
 experiments were seen to promise more than an even chance."""
 MOST = 6
 """Explanations compared at most; each is predicted for every measurement that could be made."""
-_RIVALS = 2
+_ALTERNATIVES = 2
 """Other places or dependences that are compared with the one that fits best."""
 _ROWS = 2000
-"""Rows that a rival's curves are fitted on: only its shape counts."""
+"""Rows that an alternative's curves are fitted on: only its shape counts."""
 
 _Explanation = tuple[Effect, ...]
 
@@ -141,17 +141,17 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
 
 
 def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:
-    """Return the explanations with a rival in an effect's place: those named, or the others."""
+    """Return the explanations with an alternative in an effect's place: those named, or the others."""
     sites = {site for group in verdict.sets for site in group}
     own = result.small.model.found
-    rivals = [
+    alternatives = [
         alternative
-        for candidate_set in result.slots
+        for candidate_set in result.candidate_sets
         for alternative in candidate_set
         if (alternative.site in sites) is named
     ]
-    rivals.sort(key=lambda alternative: -alternative.probability)
-    fits = [alternative.fit.model.found for alternative in rivals]
+    alternatives.sort(key=lambda alternative: -alternative.probability)
+    fits = [alternative.fit.model.found for alternative in alternatives]
     return [effects for effects in fits if effects != own]
 
 
@@ -189,15 +189,15 @@ def _without_names(
 
 
 def _others(parts: Sequence[Part]) -> list[Group]:
-    """Return the likeliest rivals of the first group that curves stand for, at other sites."""
+    """Return the likeliest alternatives of the first group that curves stand for, at other sites."""
     part = next(part for part in parts if part.group.carried)
     taken = {(p.group.at, p.group.on) for p in parts}
     out: list[Group] = []
-    for group, _ in sorted(part.rivals, key=lambda item: -item[1]):
+    for group, _ in sorted(part.alternatives, key=lambda item: -item[1]):
         if (group.at, group.on) not in taken and group.carried:
             taken.add((group.at, group.on))
             out.append(group)
-    return out[:_RIVALS]
+    return out[:_ALTERNATIVES]
 
 
 def _fitted(result: Search, effects: _Explanation) -> _Explanation:

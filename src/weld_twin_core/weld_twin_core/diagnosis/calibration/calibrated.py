@@ -102,15 +102,15 @@ def calibrated(
         reported.append(told)
         said += levels
     kinds = [one for one in said if one.kind == 'name of many']
-    slots = [cause for cause in reported if cause.slot is not None]
-    names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
+    of_rows = [cause for cause in reported if cause.row is not None]
+    names = [before.names[cause.row].features for cause in of_rows if cause.row is not None]
     few = verdict.status in NAMING and not verdict.families
-    named = {cause.slot for cause in slots}
+    named = {cause.row for cause in of_rows}
     doubted = [one.probability for k, one in enumerate(before.names) if few and k not in named]
     whole = (
         of_whole([one.probability for one in kinds], [one.features for one in kinds])
         if kinds
-        else of_whole([cause.probability for cause in slots], names, doubted)
+        else of_whole([cause.probability for cause in of_rows], names, doubted)
     )
     whole = {**before.situation, **whole, **form}
     verdict, more = _of_answer(verdict, whole, learned)
@@ -131,12 +131,12 @@ def _stated_of(
 ) -> tuple[Cause, list[Statement]]:
     """Return a cause with its probabilities, and what is said of its levels: place, dependence, name."""
     situation, both = before.situation, ('place', 'dependence')
-    if cause.slot is not None:
-        row, name = before.table[cause.slot], before.names[cause.slot]
+    if cause.row is not None:
+        row, name = before.table[cause.row], before.names[cause.row]
         own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         levels.append(replace(name, cause=k))
-        return _of_slot(cause, row, learned, *_probabilities(levels)), levels
+        return _of_row(cause, row, learned, *_probabilities(levels)), levels
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
         kind = of_kind(cause, family, len(families), before.floor)
@@ -172,7 +172,7 @@ def _of_answer(
     return out, [complete, answer]
 
 
-def _of_slot(
+def _of_row(
     cause: Cause, row: Row, learned: Calibration, place: float, dependence: float, name: float
 ) -> Cause:
     """
@@ -182,7 +182,7 @@ def _of_slot(
     each name brings its own along.
     """
     named = _scaled(cause.name, name)
-    own = {one.site: one for one in row.slot}
+    own = {one.site: one for one in row.candidate_set}
     places = marginal((own[site].place, p) for site, p in named)
     dependences = marginal((own[site].dependence, p) for site, p in named)
     return replace(

@@ -52,7 +52,7 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
     """Return the features that all statements of a diagnosis share."""
     floor = max(evidence.floor, 1e-12)
     # An instrument of another law, about an origin of its own, is near to a scale and a moved base.
-    places = {candidate_set[0].place for candidate_set in evidence.slots}
+    places = {candidate_set[0].place for candidate_set in evidence.candidate_sets}
     return plain(
         {
             'gap': log(evidence.gap / floor),
@@ -82,7 +82,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     return plain(
         {
             'weight': odds(row.mass),
-            'evidence': log1(row.leader.nats),
+            'evidence': log1(row.leader.log_bayes),
             'behind': log1(row.leader.behind),
             'size': log(size),
             'wander': log(wandered),

@@ -28,13 +28,13 @@ class Term:
     """What one feature adds to the log odds."""
 
     weight: float
-    """Nats for each unit of the feature."""
+    """Log odds for each unit of the feature."""
     low: float
     high: float
     """Range that was learned from; beyond it nothing is known, and the feature counts as its
     end."""
 
-    def nats(self, value: float) -> float:
+    def log_odds(self, value: float) -> float:
         """Return what it adds to the log odds."""
         return self.weight * min(max(value, self.low), self.high)
 
@@ -55,7 +55,7 @@ class Logistic:
         features: one that is missing counts as zero, such as a family that is not named.
         """
         total = self.constant
-        total += sum(term.nats(features.get(name, 0.0)) for name, term in self.terms.items())
+        total += sum(term.log_odds(features.get(name, 0.0)) for name, term in self.terms.items())
         return float(1.0 / (1.0 + np.exp(-total)))
 
 

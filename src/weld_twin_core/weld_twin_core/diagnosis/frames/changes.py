@@ -181,7 +181,7 @@ def _chosen(
             if i not in kept
         }
         best = max(scores, key=lambda i: scores[i])
-        if scores[best] < now + beliefs.enter_nats:
+        if scores[best] < now + beliefs.enter_log_bayes:
             break
         kept.append(best)
         now = scores[best]
@@ -199,7 +199,7 @@ def _places(problem: Problem, model: Model) -> list[Array]:
 def _evidence(
     normal: Array, right: Array, ridge: Array, fixed: Array, parts: Sequence[Array]
 ) -> float:
-    """Return the log evidence of some columns beside those that are always fitted, in nats."""
+    """Return the log evidence of some columns beside those that are always fitted."""
     more = np.concatenate([np.zeros(0, dtype=int), *parts]).astype(int)
     index = np.concatenate([fixed, more]).astype(int)
     if not index.size:

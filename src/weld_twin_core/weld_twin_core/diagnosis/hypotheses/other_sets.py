@@ -35,7 +35,7 @@ COMPLETED = 2
 LONGEST = 6
 """Effects that a set gains at most: cells have one to six causes."""
 AHEAD = 1.0
-"""Evidence [nats] by which another set must be ahead to be taken: less is rounding."""
+"""Log Bayes factor by which another set must be ahead to be taken: less is rounding."""
 ROUNDS = 4
 """Sets taken one after the other at most; bounds the time."""
 
@@ -47,7 +47,7 @@ class Other(NamedTuple):
     """What it does without; None where waves were only chosen anew."""
     fit: Fit
     ahead: float
-    """By how much evidence [nats] it is ahead of what was found; less than nothing where
+    """By how large a log Bayes factor it is ahead of what was found; less than nothing where
     behind."""
 
 
@@ -62,8 +62,8 @@ class Sets:
     """Products of the library's columns with what spans the frames, shape (K, P)."""
     right: Array
     """Products of its columns with the residual, shape (K,)."""
-    enter_nats: float
-    """Evidence [nats] that a unit must be worth."""
+    enter_log_bayes: float
+    """Log Bayes factor that a unit must be worth."""
     count: float = 1.0
     """Number of independent rows."""
     _cross: dict[int, Array] = field(default_factory=dict, repr=False)
@@ -78,12 +78,12 @@ class Sets:
         frames, right = products[:, :-1], products[:, -1]
         rss, pull = float(residual @ residual), np.zeros(len(span))
         systems = work.library.systems.given(np.eye(len(span)), pull, rss, products)
-        return cls(work.library, systems, frames, right, work.beliefs.enter_nats)
+        return cls(work.library, systems, frames, right, work.beliefs.enter_log_bayes)
 
     def worth(self, chosen: Sequence[Choice]) -> float:
-        """Return the evidence [nats] of a set against the frames alone; each unit costs its entry."""
+        """Return the log Bayes factor of a set against the frames alone; each unit costs its entry."""
         columns = _columns(chosen)
-        cost = sum(float(np.log(choice.unit.trials)) + self.enter_nats for choice in chosen)
+        cost = sum(float(np.log(choice.unit.trials)) + self.enter_log_bayes for choice in chosen)
         normal, pull = self._equations(columns)
         gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
         return evidence(self.systems.rss, gain, float(len(columns)), self.count) - cost
@@ -150,7 +150,7 @@ class Sets:
     def _entering(self, chosen: Sequence[Choice], never: Part | None) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
         taken = self._open([*filter(None, [never]), *(choice.part for choice in chosen)])
-        return self.beside(chosen, ~taken, self.enter_nats)
+        return self.beside(chosen, ~taken, self.enter_log_bayes)
 
     def _grown(self, chosen: list[Choice], never: Part | None, most: int) -> list[Choice]:
         """Return a set with what else earns a place, one unit after the other."""
@@ -192,7 +192,7 @@ def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
     """Return the best set without each part found, where it is near what was found."""
     found = [parts(effect) for effect in now.model.found]
     chosen, out = sets.of(part for each in found for part in each), []
-    least = sets.worth(chosen) - work.beliefs.rival_nats
+    least = sets.worth(chosen) - work.beliefs.alternative_log_bayes
     several = [each for each in found if len(each) > 1]
     ways: list[tuple[list[Part], Part | None]] = [
         ([Part(place)], Part(place)) for place in sites(now)

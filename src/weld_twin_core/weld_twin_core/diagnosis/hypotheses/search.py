@@ -14,9 +14,9 @@ from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
+from .alternatives import CandidateSet, fit_alternatives, with_leads
 from .library import Library, build
 from .other_sets import AHEAD, Sets, reconsidered
-from .rivals import Rival, rivals, with_leads
 from .selection import (
     Workspace,
     backward,
@@ -34,7 +34,7 @@ FIT_ROWS = 30000
 ROUNDS = 3
 """Times that a library is built anew at what was found; the second seldom changes anything."""
 SWAPS = 3
-"""Times that a rival that is clearly ahead may take an effect's place before the search stops asking."""
+"""Times that an alternative that is clearly ahead may take an effect's place."""
 Progress = Callable[[str], None]
 
 
@@ -51,11 +51,11 @@ class Search:
     precision: Array
     """Prior precision of the final fit's coordinates, shape (K,)."""
     work: Workspace
-    """The library that rivals are drawn from."""
+    """The library that alternatives are drawn from."""
     small: Fit
     """The final fit on the workspace's measurements."""
-    slots: tuple[tuple[Rival, ...], ...]
-    """For every found effect itself and its rivals; empty when many were fitted together."""
+    candidate_sets: tuple[CandidateSet, ...]
+    """For every found effect itself and its alternatives; empty when many were fitted together."""
     crowded: bool = False
     """Whether so many units came one by one that the selection among them was not finished."""
     dense: bool = False
@@ -95,17 +95,17 @@ def search(
     progress('baseline fitted')
     few = problem.thinned(SEARCH_ROWS)
     work, now, refused, crowded = _chosen(few, baseline.model, exclude, beliefs, progress)
-    slots: tuple[tuple[Rival, ...], ...] = ()
+    candidate_sets: tuple[CandidateSet, ...] = ()
     if not crowded:
         now = possible(work, now, refused)
-        now, slots = settled(work, now, progress)
-        slots, better = with_leads(work, now, slots)
+        now, candidate_sets = settled(work, now, progress)
+        candidate_sets, better = with_leads(work, now, candidate_sets)
         refused += better
     final, scale = _fitted(full, now.model)
     if absurd := implausible(final.model):
         refused += absurd
         kept = [k for k, e in enumerate(final.model.found) if not beyond(final.model.robot, e)]
-        slots = tuple(slots[k] for k in kept) if slots else ()
+        candidate_sets = tuple(candidate_sets[k] for k in kept) if candidate_sets else ()
         final, scale = _fitted(full, possible_part(final.model))
     return Search(
         problem=full,
@@ -115,7 +115,7 @@ def search(
         precision=effect_precision(final.model),
         work=work,
         small=now,
-        slots=slots,
+        candidate_sets=candidate_sets,
         crowded=crowded,
         refused=tuple(refused),
     )
@@ -162,33 +162,34 @@ def _chosen(
     return work, now, refused, crowded
 
 
-def settled(
-    work: Workspace, now: Fit, progress: Progress
-) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
-    """Return the fit in which every effect is the best in its place, and its rivals."""
+def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[CandidateSet, ...]]:
+    """Return the fit in which every effect is the best in its place, and its alternatives."""
     if not now.model.found:
         return now, ()
     sets, had = Sets.about(work, now), [names(now.model)]
     for attempt in range(SWAPS + 1):
         now, others = reconsidered(work, now, sets)
         progress('other sets weighed')
-        slots = []
+        candidate_sets = []
         for k, effect in enumerate(now.model.found):
-            slots.append(rivals(work, now, k, others))
-            progress(f'rivals of {Site.of(effect)} weighed')
-            leader, own = slots[-1][0], next(r for r in slots[-1] if r.fit is now)
+            candidate_sets.append(fit_alternatives(work, now, k, others))
+            progress(f'alternatives of {Site.of(effect)} weighed')
+            leader, own = (
+                candidate_sets[-1][0],
+                next(r for r in candidate_sets[-1] if r.fit is now),
+            )
             # What was had before comes back only where that is more than rounding.
-            most = own.nats + AHEAD * (names(leader.fit.model) in had)
-            if leader.nats > most and attempt < SWAPS:
+            most = own.log_bayes + AHEAD * (names(leader.fit.model) in had)
+            if leader.log_bayes > most and attempt < SWAPS:
                 swapped = backward(work, leader.fit)
-                # A rival that does not earn a place itself takes none from what did.
+                # An alternative that does not earn a place itself takes none from what did.
                 if leader.site in sites(swapped):
                     now = swapped
                     had.append(names(now.model))
                     break
         else:
             break
-    return now, tuple(slots)
+    return now, tuple(candidate_sets)
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:

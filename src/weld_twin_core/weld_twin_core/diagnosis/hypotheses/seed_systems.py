@@ -135,14 +135,14 @@ def grown(
     alike: Alike, rss: float, effective: float, least: float = -np.inf
 ) -> tuple[NDArray[np.bool_], Array]:
     """
-    Return which columns of every seed are worth it, bool (S, K), and their evidence [nats], (S,).
+    Return which columns of every seed are worth it, bool (S, K), and their log Bayes factor, (S,).
 
     Columns enter one at a time, the one that explains most first, as long as the evidence
     grows; all together where that is worth more.
 
     rss: sum of squares of the residual.
     effective: number of independent rows.
-    least: evidence [nats] up to which it does not matter which columns are worth it.
+    least: log Bayes factor up to which it does not matter which columns are worth it.
     """
     diagonal, eye = np.einsum('sii->si', alike.normal), np.eye(alike.right.shape[1])
     live = diagonal > FLAT * alike.size
@@ -222,7 +222,7 @@ class Choice:
 
     unit: Unit
     seed: int
-    nats: float
+    log_bayes: float
     """Log of the evidence ratio against leaving the unit out (Schwarz's approximation)."""
     alike: Alike
     """The systems that the seed's is among."""
@@ -265,7 +265,7 @@ def ranking(
     systems: normal equations of all seeds, with the model projected out.
     units: what may enter, each as a whole.
     effective: number of independent rows.
-    least: evidence [nats] that a choice must exceed.
+    least: log Bayes factor that a choice must exceed.
     roles: which units are asked.
     open_to: which seeds may be chosen, counted over the units in order, shape (S,); all by default.
     """
@@ -287,4 +287,4 @@ def ranking(
         k, r = group[first[u] + seed], row[first[u] + seed]
         chosen = np.flatnonzero(each[k][0][r])
         result.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
-    return sorted(result, key=lambda choice: -choice.nats)
+    return sorted(result, key=lambda choice: -choice.log_bayes)

@@ -27,7 +27,7 @@ from .starts import started
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
 FAR, FAR_SHARE = 60.0, 1.5
-"""Evidence [nats] behind, and times what is left, from which on a fit that a linear step foretells is
+"""Log Bayes factor behind, and times what is left, from which on a fit that a linear step foretells is
 not worth doing: others that bend take over some of what is missing, but not a third."""
 
 
@@ -114,7 +114,7 @@ class Workspace:
 
     def ahead(self, own: Fit, now: Fit) -> float:
         """
-        Return by how much evidence [nats] one set is ahead of another.
+        Return by how much log Bayes factor one set is ahead of another.
 
         An effect or a wave more costs what it costs to enter: that two errors happen to be one
         is seldom.
@@ -125,7 +125,7 @@ class Workspace:
 
         def cost(result: Fit) -> float:
             each = (part for effect in result.model.found for part in parts(effect))
-            return sum(trials.get(part.site, 0.0) + self.beliefs.enter_nats for part in each)
+            return sum(trials.get(part.site, 0.0) + self.beliefs.enter_log_bayes for part in each)
 
         more = float(own.coordinates.size - now.coordinates.size)
         count = self.independent((now, own))
@@ -208,7 +208,7 @@ def _selected(
         taken = sites(now)
         ranked = [
             choice
-            for choice in work.ranked(now, rows, work.beliefs.enter_nats)
+            for choice in work.ranked(now, rows, work.beliefs.enter_log_bayes)
             if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
             if choice.unit.site not in (gone or ())
         ]
@@ -232,25 +232,25 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool
     """
     beliefs, impossible, passed = work.beliefs, list[Effect](), False
     while ranked:
-        slack = max(beliefs.close_nats, beliefs.close_share * ranked[0].nats)
-        close = [c for c in ranked if c.nats > ranked[0].nats - slack][:SHORTLIST]
+        slack = max(beliefs.close_log_bayes, beliefs.close_share * ranked[0].log_bayes)
+        close = [c for c in ranked if c.log_bayes > ranked[0].log_bayes - slack][:SHORTLIST]
         tried = [(work.fitted_with(now.model, c.effect()), c.unit) for c in close]
         count = work.effective(min((one for one, _ in tried), key=lambda f: f.rss), beliefs.hope)
         worth = []
         for one, unit in tried:
             freedom = one.coordinates.size - now.coordinates.size
-            nats = evidence(now.rss, now.rss - one.rss, freedom, count)
-            worth.append((nats - float(np.log(unit.trials)), one, unit))
-        worth = [item for item in worth if item[0] > beliefs.enter_nats]
+            log_bayes = evidence(now.rss, now.rss - one.rss, freedom, count)
+            worth.append((log_bayes - float(np.log(unit.trials)), one, unit))
+        worth = [item for item in worth if item[0] > beliefs.enter_log_bayes]
         absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
         impossible += [effect for _, effect in absurd]
         # A choice that stays within its own limits may enter: what it drives beyond theirs goes then.
         barred = {site for site, e in absurd if not makes_room or Site.of(e) == site}
         remaining = [item for item in worth if item[2].site not in barred]
-        for nats, one, unit in sorted(remaining, key=lambda item: -item[0]):
+        for log_bayes, one, unit in sorted(remaining, key=lambda item: -item[0]):
             best = possible(work, one, [])
             if unit.site in sites(best):
-                return _Step(best, f'{unit.site} (+{nats:.0f} nats)', impossible, passed)
+                return _Step(best, f'{unit.site} (+{log_bayes:.0f})', impossible, passed)
         if not absurd:
             break
         passed |= not all(_misshapen(now.model.robot, effect) for _, effect in absurd)
@@ -320,7 +320,7 @@ def backward(work: Workspace, now: Fit) -> Fit:
             freedom = now.coordinates.size - one.coordinates.size
             worth[k] = evidence(one.rss, one.rss - now.rss, freedom, count)
         k = min(worth, key=worth.__getitem__, default=-1)
-        if k < 0 or worth[k] >= beliefs.enter_nats:
+        if k < 0 or worth[k] >= beliefs.enter_log_bayes:
             k = int(np.argmin([size for _, size in less]))
             if less[k][1] > most:
                 break

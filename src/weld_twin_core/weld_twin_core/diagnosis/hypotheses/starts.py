@@ -99,7 +99,7 @@ def profile(problem: Problem, model: Model, scale: Scale, k: int) -> Tried | Non
 
 
 def _prior(effects: list[Effect]) -> Array:
-    """Return how plausible instances are by the size of what bends them, shape (D,) [nats]."""
+    """Return how plausible instances are by the size of what bends them, shape (D,)."""
     sizes = enumerate(effects[0].parameters)
     bent = [k for k, p in sizes if not p.linear and p.lower >= 0.0]
     typical = np.array([effects[0].parameters[k].typical for k in bent])

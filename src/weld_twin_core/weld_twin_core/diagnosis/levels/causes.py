@@ -97,13 +97,13 @@ def _cause(
     name: Mapping[Site, float],
     *,
     share: float = nan,
-    slot: int | None = None,
+    row: int | None = None,
     effect: int | None = None,
 ) -> Cause:
     """Return a cause; its share is that of a kind, or of groups, where it is given already."""
     names = tuple((site, p) for site, p in name.items() if p >= LISTED)
     levels = _listed(place), _listed(dependence), names
-    return Cause(*levels, share, (nan, nan), members, slot=slot, effect=effect)
+    return Cause(*levels, share, (nan, nan), members, row=row, effect=effect)
 
 
 def _sized(cause: Cause, share: float, error: float) -> Cause:
@@ -146,13 +146,13 @@ def _told_claims(result: Search, table: Sequence[Row], verdict: Verdict) -> list
         k = next(i for i, row in enumerate(table) if row.leader.site in group)
         taken = {member for claim in out for member in claim.members}
         # A member that was taken out of the library may lead its set; the model holds another.
-        among = (group, [one.site for one in table[k].slot])
+        among = (group, [one.site for one in table[k].candidate_set])
         own = (m for some in among for m, s in enumerate(sites) if s in some and m not in taken)
         member = next(own, None)
         if member is not None:
             names = {site: p for site, p in table[k].names().items() if site in group}
             levels = table[k].places(), table[k].dependences(), names
-            out.append(_cause((member,), *levels, slot=k, effect=at))
+            out.append(_cause((member,), *levels, row=k, effect=at))
     return out
 
 
@@ -167,7 +167,7 @@ def _nameless(
     """Return all claims with those of curves that the model holds, and what is left beside."""
     if verdict.status != 'unknown':
         # What was found and does not count as named is left, and nothing else says where it sits.
-        return reported, _rest([], beliefs) if len(reported) < len(result.slots) else None
+        return reported, _rest([], beliefs) if len(reported) < len(result.candidate_sets) else None
     model = result.final.model.found
     places = _by_place(placing.parts)
     held = _carried_by(places, curved) if places else {}

@@ -54,7 +54,9 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     reported = {site for group in verdict.sets for site in group}
     kept = [
         effect
-        for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False)
+        for effect, candidate_set in zip(
+            result.final.model.found, result.candidate_sets, strict=False
+        )
         if {Site.of(effect), candidate_set[0].site} & reported
     ]
     of_setup = (e for e in result.final.model.found if not (e.traits.cause or e.traits.bends))
@@ -116,7 +118,7 @@ def carried(
     # The frames alone were fitted when the noise was not known yet.
     bare = result.problem.whitened(result.problem.residuals(result.baseline.model), result.scale)
     final = replace(result.baseline, residual=bare)
-    result = replace(result, final=final, precision=np.zeros(0), slots=(), dense=False)
+    result = replace(result, final=final, precision=np.zeros(0), candidate_sets=(), dense=False)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     return result, unseen, shrink, replace(verdict, sets=())

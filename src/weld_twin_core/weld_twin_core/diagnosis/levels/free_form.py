@@ -42,14 +42,14 @@ class Part:
 
     group: Group
     ridge: float
-    rivals: tuple[tuple[Group, float], ...]
+    alternatives: tuple[tuple[Group, float], ...]
     """Each group that could stand in its place and its weight, itself included."""
     share: float = 0.0
     """Of the squared error that is lost without it on unseen folds."""
 
     def weight_of(self, kind: str) -> dict[str, float]:
         """Return the weight of every place ('at') or dependence ('on'), largest first."""
-        out = marginal((str(getattr(group, kind)), weight) for group, weight in self.rivals)
+        out = marginal((str(getattr(group, kind)), weight) for group, weight in self.alternatives)
         return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @property
@@ -100,7 +100,7 @@ def free_form(
     wandering: bool = False,
 ) -> FreeForm:
     """
-    Return the few groups that explain what a fit leaves, each with its rivals.
+    Return the few groups that explain what a fit leaves, each with its alternatives.
 
     bare: frames and the effects that are named beyond doubt.
     wandering: look for what changes as the recording goes on, and ask no more of it than to
@@ -115,9 +115,9 @@ def free_form(
     members = chosen(work, beliefs)
     parts, total = [], worth(work, members)
     for k, member in enumerate(members):
-        weights = rival_weights(work, members, k, beliefs)
-        rivals = tuple((groups[g], w) for g, w in weights if w > 0.0)
-        parts.append(Part(groups[member.group], member.ridge, rivals, total.shares[k]))
+        weights = alternative_weights(work, members, k, beliefs)
+        alternatives = tuple((groups[g], w) for g, w in weights if w > 0.0)
+        parts.append(Part(groups[member.group], member.ridge, alternatives, total.shares[k]))
     return FreeForm(tuple(parts), total.gain, total.steady)
 
 
@@ -253,7 +253,7 @@ def worth(work: Choosing, members: list[Member]) -> Worth:
     return Worth(tuple(float(gain * loss / whole) for loss in losses), gain, steady)
 
 
-def rival_weights(
+def alternative_weights(
     work: Choosing, members: list[Member], k: int, beliefs: Beliefs
 ) -> list[tuple[int, float]]:
     """

@@ -47,7 +47,7 @@ def gathered(
     whole = max(float(total @ total), 1e-300)
     recordings = result.problem.recordings
     return Evidence(
-        slots=result.slots,
+        candidate_sets=result.candidate_sets,
         structure=leftover,
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,

@@ -145,7 +145,7 @@ def _together(
         scale=scale,
         final=final,
         precision=precision,
-        slots=(),
+        candidate_sets=(),
         dense=True,
         refused=tuple(refused),
     )

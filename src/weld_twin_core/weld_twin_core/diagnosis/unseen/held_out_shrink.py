@@ -24,7 +24,7 @@ from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
 from ..frames.aligned import aligned
-from ..hypotheses.rivals import Rival, rivals, with_leads
+from ..hypotheses.alternatives import Alternative, CandidateSet, fit_alternatives, with_leads
 from ..hypotheses.search import Search, refitted
 from ..hypotheses.seed_systems import Role
 from ..hypotheses.selection import implausible
@@ -254,25 +254,24 @@ def ratio_interval(
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))
 
 
-Slot = tuple[Rival, ...]
-
-
 def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
     """
-    Return the search with the effects and the rivals that held-out recordings bear out.
+    Return the search with the effects and the alternatives that held-out recordings bear out.
 
-    An effect gives its place to its like where that alone carries over. Then rivals that leave more
-    than the effect in the model are none.
+    An effect gives its place to its like where that alone carries over. Then those that leave more
+    than the effect in the model are no alternatives.
 
     holdout: never fitted; without any nothing changes.
     """
     if not holdout:
         return result
-    # What no machine has is left out of the model and its slots, and still is in the rivals' fits.
-    if len(result.slots) == len(result.small.model.found):
+    # What no machine has is left out of the model and its candidate sets, not of their fits.
+    if len(result.candidate_sets) == len(result.small.model.found):
         result = _exchanged(result, holdout, beliefs)
-    slots = list[Slot]()
-    for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False):
+    candidate_sets = list[CandidateSet]()
+    for effect, candidate_set in zip(
+        result.final.model.found, result.candidate_sets, strict=False
+    ):
         own = Site.of(effect)
         close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
         certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure
@@ -280,17 +279,17 @@ def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) ->
             remaining = _left(result, close, holdout, beliefs)
             by_site = dict(zip((r.site for r in close), remaining, strict=True))
             candidate_set = _alike(candidate_set, own, by_site, beliefs)
-        slots.append(candidate_set)
-    return replace(result, slots=tuple(slots))
+        candidate_sets.append(candidate_set)
+    return replace(result, candidate_sets=tuple(candidate_sets))
 
 
 def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
     """Return the search with every effect replaced by its like where that alone carries over."""
-    for _ in result.slots:
+    for _ in result.candidate_sets:
         # Those that could be in the model as well.
         likes = [
             one
-            for one in chain.from_iterable(result.slots)
+            for one in chain.from_iterable(result.candidate_sets)
             if one.probability >= beliefs.listed
             and one.fit is not result.small
             and one.role is not Role.TAKEN_OUT
@@ -304,21 +303,23 @@ def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -
         if implausible(tried.final.model):
             break
         case = result.work, better.fit
-        every = [rivals(*case, k) for k in range(len(better.fit.model.found))]
-        slots, refused = with_leads(*case, every)
-        result = replace(tried, slots=slots, refused=(*tried.refused, *refused))
+        every = [fit_alternatives(*case, k) for k in range(len(better.fit.model.found))]
+        candidate_sets, refused = with_leads(*case, every)
+        result = replace(tried, candidate_sets=candidate_sets, refused=(*tried.refused, *refused))
     return result
 
 
 def _left(
-    result: Search, some: Sequence[Rival], holdout: Sequence[Recording], beliefs: Beliefs
+    result: Search, some: Sequence[Alternative], holdout: Sequence[Recording], beliefs: Beliefs
 ) -> list[float]:
-    """Return what each rival leaves on held-out recordings, RMS [m]."""
+    """Return what each alternative leaves on held-out recordings, RMS [m]."""
     return [left_on(replace(result, final=one.fit), holdout, beliefs) for one in some]
 
 
-def _alike(candidate_set: Slot, own: Site, remaining: dict[Site, float], beliefs: Beliefs) -> Slot:
-    """Return a slot without the rivals that leave more than the effect in the model."""
+def _alike(
+    candidate_set: CandidateSet, own: Site, remaining: dict[Site, float], beliefs: Beliefs
+) -> CandidateSet:
+    """Return a candidate set without the alternatives that leave more than the effect in the model."""
     most = (1.0 + beliefs.parted) * min(remaining.values())
     if remaining.get(own, most) > most:
         return candidate_set

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..beliefs import Beliefs
+from ..hypotheses.alternatives import CandidateSet
 from ..result import Family, Site
-from .evidence import Evidence, Slot, named_together
+from .evidence import Evidence, named_together
 
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
@@ -129,12 +130,15 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     remaining = Left(evidence, beliefs or Beliefs())
     if evidence.families is not None:
         return _of_families(remaining)
-    if not evidence.slots:
+    if not evidence.candidate_sets:
         return _of_nothing(remaining)
-    sets = tuple(named_together(slot, remaining.beliefs) for slot in evidence.slots)
+    sets = tuple(
+        named_together(candidate_set, remaining.beliefs)
+        for candidate_set in evidence.candidate_sets
+    )
     likely = [
-        p > LIKELIER and not _mean_of_jumps(evidence, slot)
-        for slot, p in zip(evidence.slots, evidence.believed, strict=True)
+        p > LIKELIER and not _mean_of_jumps(evidence, candidate_set)
+        for candidate_set, p in zip(evidence.candidate_sets, evidence.believed, strict=True)
     ]
     named = remaining.explained * _share_of(likely, evidence)
     more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
@@ -151,7 +155,7 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
 
 
-def _mean_of_jumps(evidence: Evidence, candidate_set: Slot) -> bool:
+def _mean_of_jumps(evidence: Evidence, candidate_set: CandidateSet) -> bool:
     """Return whether an effect depends on the direction of a joint that noise comes from."""
     leader, joints = candidate_set[0], {one.joint for one in evidence.scattered}
     return leader.site.joint in joints and leader.dependence == 'direction'
@@ -176,8 +180,8 @@ def _why_unknown(
         out.append(_depends(evidence))
     doubted = [
         group[0]
-        for group, slot, holds in zip(sets, evidence.slots, likely, strict=True)
-        if not (holds or _mean_of_jumps(evidence, slot))
+        for group, candidate_set, holds in zip(sets, evidence.candidate_sets, likely, strict=True)
+        if not (holds or _mean_of_jumps(evidence, candidate_set))
     ]
     if doubted:
         names = ', '.join(map(str, doubted))

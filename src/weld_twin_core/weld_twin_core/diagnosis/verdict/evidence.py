@@ -16,7 +16,7 @@ from typing import NamedTuple, TypeVar
 
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
-from ..hypotheses.rivals import Rival
+from ..hypotheses.alternatives import Alternative, CandidateSet
 from ..result import Family, Site, Structure
 
 
@@ -34,8 +34,8 @@ class Scatter(NamedTuple):
 class Evidence:
     """What the verdict is drawn from."""
 
-    slots: tuple[tuple[Rival, ...], ...]
-    """For every found effect, itself and its rivals, most probable first."""
+    candidate_sets: tuple[CandidateSet, ...]
+    """For every found effect, itself and its alternatives, most probable first."""
     structure: Structure
     """What generic columns still find."""
     gap: float
@@ -81,44 +81,42 @@ class Evidence:
 
 
 Key = TypeVar('Key')
-Slot = tuple[Rival, ...]
-"""An effect found and its alternatives, most probable first; their weights add up to one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
     """One effect found, with what could stand in its place."""
 
-    slot: Slot
+    candidate_set: CandidateSet
     listed: tuple[Site, ...]
     """Those named together: the leader alone where it has nearly all of the weight."""
 
     @classmethod
-    def of(cls, slot: Slot, beliefs: Beliefs) -> Row:
+    def of(cls, candidate_set: CandidateSet, beliefs: Beliefs) -> Row:
         """Return the row of an effect found."""
-        return cls(slot, named_together(slot, beliefs))
+        return cls(candidate_set, named_together(candidate_set, beliefs))
 
     @property
-    def leader(self) -> Rival:
+    def leader(self) -> Alternative:
         """Return the most probable; its evidence is how far the answer with it is ahead."""
-        return self.slot[0]
+        return self.candidate_set[0]
 
     @property
     def mass(self) -> float:
         """Return the weight of all that are named together."""
-        return float(sum(one.probability for one in self.slot if one.site in self.listed))
+        return float(sum(one.probability for one in self.candidate_set if one.site in self.listed))
 
     def names(self) -> dict[Site, float]:
         """Return the weight of every name."""
-        return marginal((one.site, one.probability) for one in self.slot)
+        return marginal((one.site, one.probability) for one in self.candidate_set)
 
     def places(self) -> dict[str, float]:
         """Return the weight of every place."""
-        return marginal((one.place, one.probability) for one in self.slot)
+        return marginal((one.place, one.probability) for one in self.candidate_set)
 
     def dependences(self) -> dict[str, float]:
         """Return the weight of everything that it may depend on."""
-        return marginal((one.dependence, one.probability) for one in self.slot)
+        return marginal((one.dependence, one.probability) for one in self.candidate_set)
 
 
 def marginal(weights: Iterable[tuple[Key, float]]) -> dict[Key, float]:
@@ -129,7 +127,7 @@ def marginal(weights: Iterable[tuple[Key, float]]) -> dict[Key, float]:
     return out
 
 
-def named_together(candidate_set: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
+def named_together(candidate_set: CandidateSet, beliefs: Beliefs) -> tuple[Site, ...]:
     """Return the leader alone when it is sure, else all worth naming, the simplest first."""
     if candidate_set[0].probability >= beliefs.sure:
         return (candidate_set[0].site,)

@@ -30,25 +30,24 @@ from .seed_systems import Choice, Part, Role, evidence
 from .selection import Workspace, backward, implausible, sites
 
 SHORTLIST, BESIDE = 7, 3
-"""Rivals that may be in the model, and others of each role, fitted at the most; bounds the time."""
+"""Alternatives that may be in the model, and others of each role, fitted at most; bounds the time."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class Alternative:
     """A unit in the place of a found effect: its evidence, and the fit with it."""
 
     site: Site
-    nats: float
+    log_bayes: float
     fit: Fit
     probability: float = 0.0
     """Its share of the evidence in this place."""
     behind: float = 0.0
-    """By how much a family that was taken out is ahead in this place [nats]; 0 of none."""
+    """By how much a family that was taken out is ahead in this place; 0 of none."""
     role: Role = Role.FOUND
     """Whether it may be in the model."""
     ahead: float = 0.0
-    """By how much evidence it is ahead of all that may be in the model, where it may not
-    [nats]."""
+    """By how much evidence it is ahead of all that may be in the model, where it may not."""
 
     @property
     def place(self) -> str:
@@ -67,7 +66,13 @@ class Rival:
         return next((e for e in self.fit.model.found if Site.of(e) == self.site), None)
 
 
-def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> tuple[Rival, ...]:
+CandidateSet = tuple[Alternative, ...]
+"""An effect found and its alternatives, most probable first; their weights add up to one."""
+
+
+def fit_alternatives(
+    work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()
+) -> CandidateSet:
     """
     Return found effect k and those that could take its place, most probable first.
 
@@ -88,7 +93,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
     ]
     count = work.independent([now, *(f for _, f in tried)])
 
-    def nats(full: Fit, choice: Choice | None) -> float:
+    def log_bayes(full: Fit, choice: Choice | None) -> float:
         freedom, trials = float(full.coordinates.size - rest.coordinates.size), 1.0
         if choice is not None:
             # Unused components of a vector effect buy nothing and cost nothing.
@@ -96,16 +101,18 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
             trials = max(choice.unit.trials, 1.0)
         return evidence(rest.rss, rest.rss - full.rss, freedom, count) - float(np.log(trials))
 
-    out = [Rival(place, nats(now, own), now)]
+    out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:
-        out.append(Rival(choice.unit.site, nats(other, choice), other, role=choice.unit.role))
+        out.append(
+            Alternative(choice.unit.site, log_bayes(other, choice), other, role=choice.unit.role)
+        )
     for other_set in others:
         if other_set.instead_of == Part(place):
             # What it has that was not found, what entered first before the others.
             known = {*sites(now), *(one.site for one in out)}
             first = next((site for site in sites(other_set.fit) if site not in known), None)
             if first is not None:
-                out.append(Rival(first, out[0].nats + other_set.ahead, other_set.fit))
+                out.append(Alternative(first, out[0].log_bayes + other_set.ahead, other_set.fit))
     return _weighed(out, work.beliefs.temperature)
 
 
@@ -114,65 +121,71 @@ def _near(
 ) -> list[Choice]:
     """Return the choices of a role near the best of them; of what may not be in the model, of all."""
     choices = [c for c in ranked if c.unit.role is role and c.unit.site not in taken]
-    best = max((c.nats for c in (choices if role is Role.FOUND else ranked)), default=0.0)
-    least = max(best - max(work.beliefs.rival_nats, work.beliefs.rival_share * best), 0.0)
-    near = [c for c in choices if c.nats > least]
+    best = max((c.log_bayes for c in (choices if role is Role.FOUND else ranked)), default=0.0)
+    least = max(
+        best - max(work.beliefs.alternative_log_bayes, work.beliefs.alternative_share * best), 0.0
+    )
+    near = [c for c in choices if c.log_bayes > least]
     return near[: SHORTLIST if role is Role.FOUND else BESIDE]
 
 
-def _weighed(every: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
-    """Return the best rival of every site, probabilities adding up to one, most probable first."""
-    most = max(one.nats for one in every if one.role is Role.FOUND)
-    out: dict[Site, Rival] = {}
+def _weighed(every: Sequence[Alternative], temperature: float) -> CandidateSet:
+    """Return the best alternative of every site, probabilities adding up to one, most probable first."""
+    most = max(one.log_bayes for one in every if one.role is Role.FOUND)
+    out: dict[Site, Alternative] = {}
     for one in every:
         if one.role is not Role.FOUND:
-            one = replace(one, nats=min(one.nats, most), ahead=one.nats - most)
-        if one.site not in out or one.nats > out[one.site].nats:
+            one = replace(one, log_bayes=min(one.log_bayes, most), ahead=one.log_bayes - most)
+        if one.site not in out or one.log_bayes > out[one.site].log_bayes:
             out[one.site] = one
-    nats = np.array([one.nats for one in out.values()])
-    weights = np.exp((nats - most) / temperature)
+    log_bayes = np.array([one.log_bayes for one in out.values()])
+    weights = np.exp((log_bayes - most) / temperature)
     weights /= weights.sum()
     told = [replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)]
     return tuple(sorted(told, key=lambda r: -r.probability))
 
 
 def with_leads(
-    work: Workspace, now: Fit, slots: Sequence[tuple[Rival, ...]]
-) -> tuple[tuple[tuple[Rival, ...], ...], list[Effect]]:
+    work: Workspace, now: Fit, candidate_sets: Sequence[CandidateSet]
+) -> tuple[tuple[CandidateSet, ...], list[Effect]]:
     """
-    Return the slots, and what was taken out and fits clearly better than what was found.
+    Return the candidate sets, and what was taken out and fits clearly better than what was found.
 
-    That is no rival any more; everything in the places that it replaces is behind it.
+    That is no alternative any more; everything in the places that it replaces is behind it.
     """
-    behind, refused, out = np.zeros(len(slots)), list[Effect](), list[tuple[Rival, ...]]()
-    for slot, effect in zip(slots, now.model.found, strict=True):
-        taken_out = [one for one in slot if one.role is Role.TAKEN_OUT]
+    behind, refused, out = np.zeros(len(candidate_sets)), list[Effect](), list[CandidateSet]()
+    for candidate_set, effect in zip(candidate_sets, now.model.found, strict=True):
+        taken_out = [one for one in candidate_set if one.role is Role.TAKEN_OUT]
         # What is the same error on any motion is ahead by its fewer numbers alone.
         foreign = [one for one in taken_out if not _same_anywhere(now, effect, one)]
         best = max(foreign, key=lambda one: one.ahead, default=None)
         if best is not None and (lead := _lead(work, now, best)) is not None:
             refused.append(best.fit.model.found[-1])
             behind = np.maximum(behind, lead)
-            slot = _weighed([one for one in slot if one is not best], work.beliefs.temperature)
-        out.append(slot)
+            candidate_set = _weighed(
+                [one for one in candidate_set if one is not best], work.beliefs.temperature
+            )
+        out.append(candidate_set)
     pairs = zip(out, behind.tolist(), strict=True)
-    return tuple(tuple(replace(one, behind=b) for one in slot) for slot, b in pairs), refused
+    return tuple(
+        tuple(replace(one, behind=b) for one in candidate_set) for candidate_set, b in pairs
+    ), refused
 
 
-def _same_anywhere(now: Fit, effect: Effect, other: Rival) -> bool:
+def _same_anywhere(now: Fit, effect: Effect, other: Alternative) -> bool:
     """Return whether an effect and another are constants that are one error on any motion."""
     beside = of_no_size(other.site)
     constants = constant(type(effect)) and constant(type(beside))
     return constants and same_error(now.model.robot, effect, beside)
 
 
-def _lead(work: Workspace, now: Fit, other: Rival) -> Array | None:
+def _lead(work: Workspace, now: Fit, other: Alternative) -> Array | None:
     """Return how far something taken out is clearly ahead of all that it replaces, or None."""
     own = backward(work, other.fit)
     kept = sites(own)
     if other.site not in kept:
         return None
-    nats = work.ahead(own, now)
-    if nats <= work.beliefs.enter_nats:
+    log_bayes = work.ahead(own, now)
+    if log_bayes <= work.beliefs.enter_log_bayes:
         return None
-    return np.array([nats * (site not in kept) for site in sites(now)])
+    return np.array([log_bayes * (site not in kept) for site in sites(now)])

@@ -7,7 +7,7 @@ from diagnosis_cells import effect, tiny
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses import search
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival, rivals
+from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative, fit_alternatives
 from weld_twin_core.diagnosis.result import Site
 
 TRUE = (
@@ -19,22 +19,22 @@ IDLE = effect('gear_ratio', joint='wrist_3_joint')
 """An effect that these data do not show."""
 
 
-def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch):
+def test_an_alternative_that_earns_no_place_takes_none_from_what_was_found(monkeypatch):
     problem, model = tiny(TRUE)
     work, now = search.workspace(problem, model.with_found(TRUE), (), Beliefs())
 
     def chosen(work, now, k, others):
-        own = Rival(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
+        own = Alternative(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
         if k == 0:
             return (own,)
         idle = work.fitted_with(now.model.without(k), IDLE)
         assert [e.name for e in idle.model.found] == ['joint_offset', 'gear_ratio']
-        return Rival(Site(IDLE.name, IDLE.site), 7.7, idle, 0.6), own
+        return Alternative(Site(IDLE.name, IDLE.site), 7.7, idle, 0.6), own
 
-    monkeypatch.setattr(search, 'rivals', chosen)
-    kept, slots = search.settled(work, now, str)
+    monkeypatch.setattr(search, 'fit_alternatives', chosen)
+    kept, candidate_sets = search.settled(work, now, str)
     assert [e.name for e in kept.model.found] == ['joint_offset', 'link_length']
-    assert len(slots) == 2
+    assert len(candidate_sets) == 2
 
 
 def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(monkeypatch):
@@ -48,7 +48,7 @@ def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(
     monkeypatch.setattr(
         type(work), 'fitted_with', lambda self, start, effect: starts.append(start) or now
     )
-    rivals(work, now, 0)
+    fit_alternatives(work, now, 0)
     assert starts
     assert all(start.found[0].number('da') == beside.number('da') for start in starts)
 
@@ -57,10 +57,10 @@ def test_what_stands_for_several_gives_way_to_them():
     problem, model = tiny(TRUE)
     stand_ins = (effect('base_pose'), effect('tool_pose'))
     work, now = search.workspace(problem, model.with_found(stand_ins), (), Beliefs())
-    kept, slots = search.settled(work, now, str)
+    kept, candidate_sets = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
     assert kept.rss < 0.1 * now.rss
-    assert len(slots) == 2
+    assert len(candidate_sets) == 2
 
 
 def test_waves_that_came_one_by_one_give_way_to_a_zero_and_one_wave():
@@ -93,13 +93,16 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
         )
         sites = Site(own.name, own.site), Site(other.name, other.site)
         if own.name == TRUE[1].name:
-            return (Rival(sites[0], 9.0, now, 1.0),)
+            return (Alternative(sites[0], 9.0, now, 1.0),)
         instead = work.fitted_with(now.model.without(k), other)
         ahead = 0.4 if own.name == first.name else back
-        order = Rival(sites[1], 9.0, instead, 0.55), Rival(sites[0], 9.0 - ahead, now, 0.45)
+        order = (
+            Alternative(sites[1], 9.0, instead, 0.55),
+            Alternative(sites[0], 9.0 - ahead, now, 0.45),
+        )
         return order if ahead else order[::-1]
 
-    monkeypatch.setattr(search, 'rivals', chosen)
+    monkeypatch.setattr(search, 'fit_alternatives', chosen)
     monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets: (now, ()))
     kept, _ = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}

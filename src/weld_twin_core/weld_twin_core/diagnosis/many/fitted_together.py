@@ -66,7 +66,7 @@ def fitted_together(
             best, remaining = trial, remains
     few = unseen_rms(result)
     several = len(result.final.model.found) >= beliefs.several
-    chance = not (result.crowded or several) and _by_chance(result, best)
+    chance = not (result.crowded or several) and _by_chance(result, best, few, remaining)
     if chance and not result.final.model.found:
         return result
     # Several that were chosen on the parts left out as well have their lead by that.
@@ -76,10 +76,14 @@ def fitted_together(
     return replace(result, many=best) if remaining < CHOSEN * few else result
 
 
-def _by_chance(few: Search, many: Search) -> bool:
-    """Return whether many errors predict no more of what a few leave than they would of noise."""
+def _by_chance(few: Search, many: Search, before: float, remaining: float) -> bool:
+    """
+    Return whether many errors predict no more of what a few leave than they would of noise.
+
+    before, remaining: what few and many leave unseen; see `unseen_rms`.
+    """
     fitted, own = (Unseen.of(s.problem, s.scale, s.final, s.precision) for s in (many, few))
-    share = 1.0 - (unseen_rms(many) / max(unseen_rms(few), 1e-12)) ** 2
+    share = 1.0 - (remaining / max(before, 1e-12)) ** 2
     if not may_be_chance(fitted.residual.size, share):
         return False
     columns, frames = fitted.columns.written_out(), fitted.frames

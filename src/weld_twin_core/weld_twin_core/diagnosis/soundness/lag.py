@@ -93,7 +93,7 @@ def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, fre
         speed = -_along(velocity, joints, t - now.at(t)) @ turn.T
         columns = [speed, speed * (t - now.middle)[:, None]][:free]
         system = np.stack([_centred(c, keep)[keep].ravel() for c in columns], axis=1)
-        gap = _centred(seen, keep) - _centred(here, keep) @ turn.T
+        gap = _off(_centred(seen, keep), _centred(here, keep), turn)
         step = np.linalg.lstsq(system, gap[keep].ravel(), rcond=None)[0]
         now = now._replace(late=now.late + step[0], rate=now.rate + (step[1] if free > 1 else 0.0))
     return now
@@ -102,7 +102,7 @@ def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, fre
 def _misfits(seen: Array, paths: Array) -> Array:
     """Return the RMS gap of (M, 3) to paths, (L, M, 3), aligned, worst samples left out."""
     turn, keep = _aligned(seen, paths)
-    square = (_off(seen, paths, turn, keep) ** 2).sum(axis=-1)
+    square = (_off(_centred(seen, keep), _centred(paths, keep), turn) ** 2).sum(axis=-1)
     return np.asarray(np.sqrt((square * keep).sum(axis=-1) / keep.sum(axis=-1)))
 
 
@@ -110,16 +110,16 @@ def _aligned(seen: Array, path: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return turns from paths (..., M, 3) to measurements, and which samples agree best."""
     keep = np.ones(path.shape[:-1], dtype=bool)
     for _ in range(2):
-        here = _centred(path, keep) * keep[..., None]
-        turn = nearest_rotation(np.swapaxes(_centred(seen, keep), -1, -2) @ here)
-        off = np.linalg.norm(_off(seen, path, turn, keep), axis=-1)
+        there, here = _centred(seen, keep), _centred(path, keep)
+        turn = nearest_rotation(np.swapaxes(there, -1, -2) @ (here * keep[..., None]))
+        off = np.linalg.norm(_off(there, here, turn), axis=-1)
         keep = off <= np.quantile(off, KEPT, axis=-1, keepdims=True)
     return turn, keep
 
 
-def _off(seen: Array, path: Array, turn: Array, keep: NDArray[np.bool_]) -> Array:
-    """Return what is left of the measurements after the best turn and shift of a path."""
-    return np.asarray(_centred(seen, keep) - _centred(path, keep) @ np.swapaxes(turn, -1, -2))
+def _off(seen: Array, path: Array, turn: Array) -> Array:
+    """Return what a turn leaves between measurements and a path, both about their means."""
+    return np.asarray(seen - path @ np.swapaxes(turn, -1, -2))
 
 
 def _centred(points: Array, keep: NDArray[np.bool_]) -> Array:

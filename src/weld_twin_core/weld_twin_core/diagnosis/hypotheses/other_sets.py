@@ -67,6 +67,7 @@ class Sets:
     count: float = 1.0
     """Number of independent rows."""
     _cross: dict[int, Array] = field(default_factory=dict, repr=False)
+    _worth: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
     @classmethod
     def about(cls, work: Workspace, now: Fit) -> Sets:
@@ -83,10 +84,15 @@ class Sets:
     def worth(self, chosen: Sequence[Choice]) -> float:
         """Return the log Bayes factor of a set against the frames alone; each unit costs its entry."""
         columns = _columns(chosen)
-        cost = sum(float(np.log(choice.unit.trials)) + self.enter_log_bayes for choice in chosen)
-        normal, pull = self._equations(columns)
-        gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
-        return evidence(self.systems.rss, gain, float(len(columns)), self.count) - cost
+        # Sets that grow from different beginnings are often the same, and what is pruned was grown.
+        asked = self.count, *columns
+        if asked not in self._worth:
+            cost = sum(float(np.log(one.unit.trials)) + self.enter_log_bayes for one in chosen)
+            normal, pull = self._equations(columns)
+            gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
+            freedom = float(len(columns))
+            self._worth[asked] = evidence(self.systems.rss, gain, freedom, self.count) - cost
+        return self._worth[asked]
 
     def beside(
         self, chosen: Sequence[Choice], open_to: NDArray[np.bool_], least: float = -np.inf

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -231,12 +232,12 @@ class Choice:
     chosen: Index
     """Of the seed's columns, those that earn their place."""
 
-    @property
+    @cached_property
     def part(self) -> Part:
         """Return what it puts into a set."""
         return parts(self.unit.seeds[self.seed])[0]
 
-    @property
+    @cached_property
     def columns(self) -> Index:
         """Return the numbers of the columns that earn their place."""
         return np.asarray(self.alike.columns[self.row][self.chosen])

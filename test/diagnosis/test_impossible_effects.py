@@ -75,5 +75,5 @@ def test_frames_stay_where_putting_them_back_takes_what_no_machine_has(
     found = search.search(problem, model, (), Beliefs(), str)
     other = effect('joint_offset', joint='elbow_joint', offset=offset)
     moved = fit(problem, found.final.model.with_found((other,)), found.scale, None, 0)
-    monkeypatch.setattr(pipeline, 'held', lambda *asked: moved)
-    assert (pipeline._held(found, model.robot).final is moved) == put_back
+    monkeypatch.setattr(pipeline, 'keep_open_directions', lambda *asked: moved)
+    assert (pipeline._near_given_frames(found, model.robot).final is moved) == put_back

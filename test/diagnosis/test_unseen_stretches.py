@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.search import search
 from weld_twin_core.diagnosis.hypotheses.starts import started
-from weld_twin_core.diagnosis.levels.curved import carried
+from weld_twin_core.diagnosis.levels.curved import choose_model
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Verdict
@@ -274,6 +274,6 @@ def test_a_gap_that_is_carried_without_a_model_keeps_its_size(times):
     unseen = Unseen.of(problem, result.scale, result.final, result.precision)
     worse = Shrink(gap, times * gap, times, (1.0, 3.0), 'stretches')
     case = result, unseen, worse, Verdict('unknown'), None, (), Beliefs()
-    _, unseen, shrink, _ = carried(*case)
+    _, unseen, shrink, _ = choose_model(*case)
     assert unseen.rms(unseen.residual) == pytest.approx(gap)
     assert shrink.rms_before_m == shrink.rms_after_m > gap

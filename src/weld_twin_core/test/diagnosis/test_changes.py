@@ -10,7 +10,7 @@ from weld_twin_core.diagnosis.algebra.fit import robust_scale
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.frames.changes import told, untold, with_changes
+from weld_twin_core.diagnosis.frames.changes import list_changes, list_undetectable, with_changes
 from weld_twin_core.effects import REGISTRY, Backlash, JointOffset, LinkTwist, ToolPose
 from weld_twin_core.errors import ModelError
 
@@ -44,7 +44,7 @@ def seen(robot, recordings, families, align=''):
     problem, model = aligned(recordings, robot, align, COMMON)
     problem, model = with_changes(problem, model, families, Beliefs())
     scale = robust_scale(problem, problem.residuals(model))
-    return told(problem, model, scale, np.zeros(0), families)
+    return list_changes(problem, model, scale, np.zeros(0), families)
 
 
 def test_nothing_changed(robot):
@@ -93,7 +93,7 @@ def test_the_third_recording_alone(robot):
 def test_what_cannot_be_told_is_listed(robot):
     """A base that is fitted takes the place of the zero of the first joint."""
     problem, model = aligned([day(robot, 1), day(robot, 2)], robot, 'base', COMMON)
-    names = untold(problem, model, ('joint_offset',))
+    names = list_undetectable(problem, model, ('joint_offset',))
     assert 'joint_offset of shoulder_pan_joint' in names
     assert 'joint_offset of elbow_joint' not in names
 

@@ -14,7 +14,7 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.curved import no_noise, placed
+from weld_twin_core.diagnosis.levels.curved import locate_gap, no_noise
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
 from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
@@ -322,11 +322,15 @@ def test_what_is_left_beside_a_model_has_a_place_where_no_curve_explains_the_gap
         independent=True,
         parts=(),
     )
-    form = placed(SimpleNamespace(dense=False), Verdict('unknown'), None, evidence, wt.Beliefs())
+    form = locate_gap(
+        SimpleNamespace(dense=False), Verdict('unknown'), None, evidence, wt.Beliefs()
+    )
     (part,) = form.parts
     assert (form.gain, form.steady, str(part.group)) == (0.6, 5.0, 'angle at elbow')
     # What nothing takes off may be anywhere.
     assert part.weight_of('at') == pytest.approx({'elbow': 0.6 / 1.1, 'wrist': 0.1 / 1.1})
     noise = replace(evidence, structure=replace(evidence.structure, gain=0.01))
-    nothing = placed(SimpleNamespace(dense=False), Verdict('unknown'), None, noise, wt.Beliefs())
+    nothing = locate_gap(
+        SimpleNamespace(dense=False), Verdict('unknown'), None, noise, wt.Beliefs()
+    )
     assert nothing.parts == ()

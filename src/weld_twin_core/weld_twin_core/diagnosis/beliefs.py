@@ -86,7 +86,7 @@ class Beliefs:
     two numbers says nothing."""
 
     wave_range: float = 1.0
-    """Travel [rad] of a joint from which on its waves are told from their neighbours' orders: over
+    """Travel [rad] of a joint from which on its waves differ from their neighbours' orders: over
     less than a sixth of a turn, orders that differ by six look alike."""
 
     line_chi2: float = 25.0
@@ -103,8 +103,8 @@ class Beliefs:
     from which on the kind is named; a tenth is what a calibration is worth doing for."""
 
     joint_worth: float = 0.1
-    """Share of a kind from which on a joint of it is told, and how nearly as well as the kind another
-    must do to be told beside it. A judgement."""
+    """Share of a kind from which on a joint of it is reported, and how nearly as well as the kind
+    another must do to be reported beside it. A judgement."""
 
     member_least_m: float = 1e-6
     """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
@@ -112,10 +112,10 @@ class Beliefs:
     # What unseen data say --------------------------------------------------------------------
 
     dependence_gain: float = 0.02
-    """Share of the squared unseen error from which what a generic column explains is told."""
+    """Share of the squared unseen error from which what a generic column explains is reported."""
 
     dependence_sure: float = 2.0
-    """The same in standard errors between stretches."""
+    """The same in standard errors between folds."""
 
     other_setup: float = 5.0
     """Times by which a held-out recording must fit better with a frame of its own to stem from
@@ -138,7 +138,7 @@ class Beliefs:
     """Probability from which on an alternative is named beside a leader that is not sure."""
 
     unexplained: float = 0.05
-    """Share of the squared gap that may stay unexplained before it is told as something left, and
+    """Share of the squared gap that may stay unexplained before it is reported as something left, and
     before the answer is 'unknown' where nothing was found."""
 
     least_excess: float = 0.05
@@ -153,10 +153,10 @@ class Beliefs:
     """Share of the squared unseen error that a structure must take away to count."""
 
     structure_sure: float = 3.0
-    """What it must take away besides, in standard errors between stretches."""
+    """What it must take away besides, in standard errors between folds."""
 
     blatant_gain: float = 0.15
-    """Share from which on fewer standard errors do: few stretches may hold all of a large one."""
+    """Share from which on fewer standard errors do: few folds may hold all of a large one."""
 
     blatant_sure: float = 1.5
     """Standard errors that such a large structure must take away."""
@@ -187,7 +187,7 @@ class Beliefs:
     no curve predicts any; the share leaves room for what real gears are beyond their formulas."""
 
     beaten_steady: float = 2.0
-    """The same in standard errors between stretches."""
+    """The same in standard errors between folds."""
 
     scatter_sure: float = 5.0
     """Standard errors from which on noise is said to come from a joint. Chance reaches 3 of a

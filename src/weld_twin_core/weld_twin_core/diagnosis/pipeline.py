@@ -14,7 +14,7 @@ from ..recording import Recording
 from .advice import Limits
 from .algebra.fit import LEAST_NOISE, NOISE_TRUST
 from .algebra.noise_floor import noise_floor
-from .algebra.open_directions import held
+from .algebra.open_directions import keep_open_directions
 from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
@@ -23,7 +23,7 @@ from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
-from .levels.curved import carried, curved, no_noise, placed
+from .levels.curved import choose_model, curved, locate_gap, no_noise
 from .levels.gathered import gathered
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
@@ -76,7 +76,7 @@ def diagnose(
     exclude : sequence of str
         Families that are still tried, but never named alone.
     holdout : sequence of Recording
-        No effect is fitted to them; they judge the shrink. Without any, each stretch of the recordings
+        No effect is fitted to them; they judge the shrink. Without any, each fold of the recordings
         is left out in turn.
     beliefs : Beliefs, optional
         The numbers that decide the verdict; the usual ones when left out.
@@ -92,7 +92,7 @@ def diagnose(
     experiment : bool
         Plan the next experiment where one is needed; without, that takes no time.
     progress : callable
-        Told in a few words what has been done.
+        Called with a few words on what has been done.
 
     Returns
     -------
@@ -156,13 +156,13 @@ def _explained(
     examined = _without_slips(result, examined, exclude, beliefs, progress)
     if examined.posed is None:
         return refusal(examined)
-    out = _told(result, examined, holdout, beliefs, limits, progress)
+    out = _conclude(result, examined, holdout, beliefs, limits, progress)
     # Where the answer that no name fits is itself probably right, the many are not tried.
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
     if result.many is None or out.status != 'unknown' or _named(out) or nameless:
         return out
     progress('a few effects leave the cause unknown: all kinds together')
-    many = _told(result.many, examined, holdout, beliefs, limits, progress)
+    many = _conclude(result.many, examined, holdout, beliefs, limits, progress)
     return many if _named(many) else out
 
 
@@ -187,7 +187,7 @@ def _named(out: Diagnosis) -> bool:
     return any(cause.effect is not None and cause.probability > LIKELIER for cause in out.causes)
 
 
-def _told(
+def _conclude(
     result: Search,
     examined: Examined,
     holdout: Sequence[Recording],
@@ -215,11 +215,11 @@ def _told(
     alternative = curved(result, verdict, beliefs)
     verdict = no_noise(verdict, alternative, beliefs)
     unseen.forget_other_parts()
-    places = placed(result, verdict, alternative, evidence, beliefs)
+    places = locate_gap(result, verdict, alternative, evidence, beliefs)
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
-    result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)
-    result = _alone(_held(result, examined.given.robot), shrink)
+    result, unseen, shrink, verdict = choose_model(result, unseen, shrink, *which)
+    result = _alone(_near_given_frames(result, examined.given.robot), shrink)
     fitted = (result.final.model, result.scale, result.precision)
     nameless = verdict.status == 'unknown'
     posterior = allowed(result.problem, *fitted, floor, nameless=nameless)
@@ -237,8 +237,10 @@ def _alone(result: Search, shrink: Shrink) -> Search:
     return replace(result, final=replace(result.final, model=own))
 
 
-def _held(result: Search, robot: Robot) -> Search:
+def _near_given_frames(result: Search, robot: Robot) -> Search:
     """Return what was found with its frames as near to the given ones as machines and data bear."""
-    final = held(result.final, result.problem, result.scale, result.precision, robot)
+    final = keep_open_directions(
+        result.final, result.problem, result.scale, result.precision, robot
+    )
     pushed = implausible(final.model) and not implausible(result.final.model)
     return result if pushed else replace(result, final=final)

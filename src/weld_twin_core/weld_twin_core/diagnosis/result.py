@@ -71,7 +71,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Unsound:
-    """A mistake in data or set-up that no cause in the arm can be told from."""
+    """A mistake in data or set-up that looks like a cause in the arm."""
 
     kind: str
     """One of `MISTAKES`."""
@@ -97,7 +97,7 @@ class Unsound:
 @dataclass(frozen=True)
 class Where:
     """
-    Where the gap lies; shares are of variance explained on stretches not used for fitting.
+    Where the gap lies; shares are of variance explained in folds not used for fitting.
 
     ``map_shares`` is the joint x regressor map: rows are joints, columns `map_regressors`.
     """
@@ -249,7 +249,7 @@ class Cause:
     effect: int | None = None
     """Its index in `Diagnosis.effects` and in `Diagnosis.indistinguishable`."""
     rest: bool = False
-    """Whether it is what is left beside everything that is told; its share is the unexplained."""
+    """Whether it is what is left beside everything that is reported; its share is the unexplained."""
     row: int | None = None
     """Which effect found by the search it is; for the steps of a diagnosis alone."""
 
@@ -307,7 +307,7 @@ class Shrink:
     alone: tuple[tuple[str, float], ...] = ()
     """RMS [m] that would remain if only this one were mended."""
     orientation_rad: tuple[float, float] | None = None
-    """RMS orientation gap before and after, on stretches taking their turn; poses only."""
+    """RMS orientation gap before and after, by cross-validation; poses only."""
     elsewhere_ci95: tuple[float, float] | None = None
     """Interval of the ratio on a motion where nothing was recorded."""
 
@@ -321,7 +321,7 @@ class Structure:
     gain: float
     """Share of the squared error on unseen stretches that it takes away."""
     sure: float
-    """The gain over its standard error between stretches."""
+    """The gain over its standard error between folds."""
     depends_on: tuple[str, ...]
     chance: float = 0.0
     """Share that the best of them hardly ever takes off noise alone; 0 where rows are many."""

@@ -83,7 +83,7 @@ class Candidate:
     alone: int = 0
     """How many of the pieces, at the end, move one joint alone."""
     changed: str = ''
-    """What is changed in the cell, as a diagnosis is told of it; empty for nothing."""
+    """What is changed in the cell, in the words that a diagnosis takes; empty for nothing."""
 
     @property
     def static(self) -> bool:

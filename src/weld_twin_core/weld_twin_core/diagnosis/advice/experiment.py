@@ -60,7 +60,7 @@ def next_experiment(
         'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
         'cost' [min] and, of that, 'robot_minutes', 'stations' (None of a path), 'between' (the two
         explanations it parts, each a list of effect, joint, place and dependence; None where nothing is
-        compared), 'changes' (what is changed in the cell, as a diagnosis is told; empty: nothing) and
+        compared), 'changes' (of the cell, in the words that a diagnosis takes; empty: none) and
         'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is None when no
         motion decides. 'skipped' says which measurements could not be foreseen. None when none
         could.
@@ -196,7 +196,7 @@ def _side(effects: Sequence[Effect]) -> list[dict[str, str | None]]:
 
 
 def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
-    """Return effects in words, beside those that they are told from."""
+    """Return effects in words, beside those that they are to be distinguished from."""
     return ' with '.join(dict.fromkeys(_name(effect, others) for effect in effects))
 
 

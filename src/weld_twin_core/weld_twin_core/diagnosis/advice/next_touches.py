@@ -281,7 +281,7 @@ def _touching(recording: Recording, q: Array, points: Array, contacts: Contacts)
 _COUNT = 12
 """Touches that are proposed: a quarter of an hour by hand."""
 MOST = 40
-"""Touches up to which it is told how many are needed."""
+"""Touches up to which the number needed is reported."""
 _REACHABLE = 0.9
 """Share of what all touches together could narrow that counts as enough."""
 _LEAST = 1e-9

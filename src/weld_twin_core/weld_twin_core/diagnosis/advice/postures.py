@@ -19,7 +19,7 @@ from ...sequences import halton
 from ..algebra.problem import Problem
 
 USUAL_MINUTES = 60.0
-"""Of robot motion that an experiment takes at most, unless told: an arm warms up in an hour."""
+"""Of robot motion that an experiment takes at most, unless given: an arm warms up in an hour."""
 
 
 @dataclass(frozen=True, eq=False)

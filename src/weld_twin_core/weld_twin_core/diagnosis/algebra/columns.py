@@ -30,7 +30,7 @@ MANY = 32
 """Coordinates of one effect in a model from which on they are kept as amounts: products of fewer are
 as quick written out."""
 BLOCKS = 24
-"""Stretches whose scores are held apart: enough to tell a variance to a third."""
+"""Folds whose scores are kept apart: enough to estimate a variance to a third."""
 SINGULAR = 1e-12
 """Share of the largest eigenvalue below which a direction is one that columns repeat."""
 TINY = 1e-300
@@ -299,13 +299,13 @@ def columns_covariance(
     Return the covariance of all columns' coefficients, shape (P, P).
 
     It holds where the model is not quite the arm: as wide as the noise makes it, or as scores do that
-    hang together within a stretch of time or differ between stretches [1]_, each coefficient by the
+    hang together within a fold or differ between folds [1]_, each coefficient by the
     larger; they hang together as their columns do.
 
     columns: p whitened columns.
     ridge: prior precision, shape (P,).
     residual: what the fit leaves, whitened, shape (rows,).
-    labels: stretch of every row, some `BLOCKS` in all, shape (rows,).
+    labels: fold of every row, some `BLOCKS` in all, shape (rows,).
     share: of the rows that count as independent.
 
     References
@@ -314,8 +314,8 @@ def columns_covariance(
 
     """
     inverse, size = unit_inverse(columns, ridge)
-    stretches = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
-    each = [columns.within(rows).times(residual[rows]) / size for rows in stretches]
+    folds = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
+    each = [columns.within(rows).times(residual[rows]) / size for rows in folds]
     scores = inverse @ np.stack(each, axis=1)
     blocks = max(len(each), 2)
     together = (scores**2).sum(axis=1) * blocks / (blocks - 1)

@@ -33,7 +33,7 @@ FRAME_SHIFT = 0.02
 FRAME_TURN = 0.05
 """Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
 STRAIGHT = 1e-6
-"""Share of what is left by which a step may miss what its equations foretold, for it to be the last:
+"""Share of what is left by which a step may miss what its equations predict, for it to be the last:
 where the residual is as good as linear, another step finds nothing."""
 STEADY = 1e-4
 """The same share up to which columns serve for the next step, too: they have hardly turned."""
@@ -155,7 +155,7 @@ def fit(
     precision: prior precision of every effect coordinate, about zero, in whitened units, shape
     (K,); that of machines at large when left out.
     tolerance: stops when the objective falls by less than this share.
-    most: stops where a step is foretold to leave more than this, whitened squares.
+    most: stops where a step is predicted to leave more than this, whitened squares.
     """
     prior = effect_precision(model) if precision is None else precision
     start = _Point.at(problem, model, scale, prior)
@@ -170,7 +170,7 @@ def fit(
     return Fit(here.model, here.residual)
 
 
-def foretold(
+def predict_fit(
     problem: Problem, model: Model, scale: Scale, columns: Columns
 ) -> tuple[Array, float]:
     """
@@ -305,7 +305,7 @@ def robust_scale(
     freedom: coordinates that the residuals' own data determined; they took their share of the
     noise.
     """
-    reported = problem.told_weights
+    reported = problem.given_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
     size = max(problem.size, 1)
     kept = max(1.0 - freedom / size, 0.0)

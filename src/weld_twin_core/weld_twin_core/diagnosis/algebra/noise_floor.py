@@ -21,7 +21,7 @@ WIDEST = 3.5e-4
 Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's.
 
 Trackers have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to
-show by itself, in repeats or differences, or be told with the data: a misfit looks the same.
+show by itself, in repeats or differences, or be given with the data: a misfit looks the same.
 """
 
 

@@ -81,7 +81,9 @@ def shown(
     return kept, size[live], *np.linalg.eigh(scaled @ scaled.T)
 
 
-def held(result: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot) -> Fit:
+def keep_open_directions(
+    result: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot
+) -> Fit:
     """
     Return the fit with the open directions as they were given, where the data bear that.
 

@@ -164,7 +164,7 @@ class Problem:
 
     @cached_property
     def roots(self) -> list[Array | None]:
-        """Return what makes independent rows of each recording's poses; None of those not told."""
+        """Return what makes independent rows of each recording's poses; None where none is given."""
         reported = (r.seen.noise for r in self.recordings)
         return [None if noise is None else noise.root for noise in reported]
 
@@ -211,9 +211,9 @@ class Problem:
         return tuple(r.seen.t.size for r in self.recordings)
 
     @cached_property
-    def told_weights(self) -> list[Array]:
+    def given_weights(self) -> list[Array]:
         """
-        Return the weight of every sample that was told with the data, shape (M,) per recording.
+        Return the weight of every sample that was given with the data, shape (M,) per recording.
 
         Of contacts whose uncertainty is known, in shares of the surest; one for all others. Where
         recordings are differently sure, less for those that are not.
@@ -414,7 +414,7 @@ class Problem:
 
     def unit_scale(self) -> Scale:
         """Return a scale before anything is known of the noise."""
-        return Scale(1e-4, 2e-4, tuple(self.told_weights))
+        return Scale(1e-4, 2e-4, tuple(self.given_weights))
 
 
 def usable(recording: Recording) -> Recording:

@@ -45,7 +45,7 @@ def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     return tuple(np.array(robot.joint_names)[travel < wide].tolist())
 
 
-def orders_told(features: Sequence[Features], joint: str) -> int:
+def separable_orders(features: Sequence[Features], joint: str) -> int:
     """Return the highest order of a wave in a joint's angle that all recordings together can tell."""
     i = features[0].twin.robot.index(joint)
     return int(highest_order(np.concatenate([maker.view.joint(i) for maker in features])))

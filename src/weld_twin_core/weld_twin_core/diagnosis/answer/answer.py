@@ -19,7 +19,7 @@ from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
 from ..calibration.features import of_form
 from ..frames.aligned import NOT_TOLD, other_causes
-from ..frames.changes import told, untold
+from ..frames.changes import list_changes, list_undetectable
 from ..hypotheses.alternatives import Alternative
 from ..hypotheses.any_motion import never_parted
 from ..hypotheses.search import Search
@@ -139,7 +139,7 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
         'recordings': result.problem.recordings,
         'traces': _traces(result),
         'absent': result.library.absent | dict.fromkeys(other_causes(result.problem), NOT_TOLD),
-        'checks': (*examined.checks, *_untold_check(result, named)),
+        'checks': (*examined.checks, *_undetectable_check(result, named)),
         'changed': _changed(result, named),
         'may_change': named,
         'unsound': examined.unsound_with(result.final.model.found),
@@ -151,12 +151,14 @@ def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     """Return what differs between the recordings beyond noise, by recording."""
     if not families:
         return ()
-    return told(result.problem, result.final.model, result.scale, result.precision, families)
+    return list_changes(
+        result.problem, result.final.model, result.scale, result.precision, families
+    )
 
 
-def _untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
+def _undetectable_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
     """Return a note of what may have changed without being seen."""
-    names = untold(result.problem, result.final.model, families)
+    names = list_undetectable(result.problem, result.final.model, families)
     if not names:
         return ()
     return (

@@ -49,9 +49,9 @@ def named_effects(
     causes: Sequence[Cause],
     posterior: Posterior,
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
-    """Return the effects told, those that move the tool most first, with verdict and causes."""
+    """Return the reported effects, those that move the tool most first, with verdict and causes."""
     model = result.final.model
-    reported = _told(model.found, verdict, causes, dense=result.dense)
+    reported = _named_sets(model.found, verdict, causes, dense=result.dense)
     squares = (unseen.targets[1:] ** 2).sum(axis=1)
     reported.sort(key=lambda pair: -squares[pair[0]])
     if not reported:
@@ -68,10 +68,10 @@ def named_effects(
     )
 
 
-def _told(
+def _named_sets(
     model: Sequence[Effect], verdict: Verdict, causes: Sequence[Cause], *, dense: bool
 ) -> list[tuple[int, int]]:
-    """Return which effects of the model are told, each with the number of its set."""
+    """Return which effects of the model are reported, each with the number of its set."""
     if not dense:
         return [(c.members[0], c.effect) for c in causes if c.effect is not None]
     sites = [Site.of(effect) for effect in model]
@@ -187,7 +187,7 @@ _SEED = 1
 """Of the draws: the same recordings give the same intervals."""
 _ENDS = (0.05, 0.95)
 """Quantiles between which nine draws of ten lie."""
-TOLD = 5e-4
+HALF_DIGIT = 5e-4
 """Half of the last digit of a share as pages tell it, 0.1 %: no interval is finer."""
 
 
@@ -198,22 +198,24 @@ def with_intervals(
     Return causes with the 90 % intervals of their shares, above a noise of RMS ``floor`` [m].
 
     Where the status is unknown, or curves or many small errors stand for the causes, intervals are
-    those that stretches tell.
+    those that folds show.
     """
     curved = len(result.candidate_sets) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.candidate_sets) or not unseen.parts:
         return tuple(covering(cause) for cause in reported)
     tries = _tries(result, unseen, floor)
     return tuple(
-        covering(cause) if cause.rest else _held(cause, tries[:, list(cause.members)].sum(axis=1))
+        covering(cause)
+        if cause.rest
+        else _with_interval(cause, tries[:, list(cause.members)].sum(axis=1))
         for cause in reported
     )
 
 
-def _held(cause: Cause, tries: Array) -> Cause:
+def _with_interval(cause: Cause, tries: Array) -> Cause:
     """Return a cause whose interval holds its own share and nine tries of ten."""
     low, high = np.quantile(tries, _ENDS)
-    low, high = min(low, cause.share) - TOLD, max(high, cause.share) + TOLD
+    low, high = min(low, cause.share) - HALF_DIGIT, max(high, cause.share) + HALF_DIGIT
     return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))
 
 

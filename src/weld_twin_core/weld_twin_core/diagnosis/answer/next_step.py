@@ -171,7 +171,7 @@ def _without_names(
     if alternative is None:
         return []
     fitted = alternative.found.final.model.found
-    parts = [part for part in alternative.form.parts if part.group.carried]
+    parts = [part for part in alternative.form.parts if part.group.movable_curves]
     if not parts:
         return []
     robot = alternative.found.final.model.robot
@@ -182,7 +182,7 @@ def _without_names(
         curves = [
             c
             for p in alternative.form.parts
-            for c in (group if p is parts[0] else p.group).carried
+            for c in (group if p is parts[0] else p.group).movable_curves
         ]
         out.append(_fitted(alternative.found, (*kept, *curves)))
     return [tuple(extended(effect, ends) for effect in effects) for effects in out]
@@ -190,11 +190,11 @@ def _without_names(
 
 def _others(parts: Sequence[Part]) -> list[Group]:
     """Return the likeliest alternatives of the first group that curves stand for, at other sites."""
-    part = next(part for part in parts if part.group.carried)
+    part = next(part for part in parts if part.group.movable_curves)
     taken = {(p.group.at, p.group.on) for p in parts}
     out: list[Group] = []
     for group, _ in sorted(part.alternatives, key=lambda item: -item[1]):
-        if (group.at, group.on) not in taken and group.carried:
+        if (group.at, group.on) not in taken and group.movable_curves:
             taken.add((group.at, group.on))
             out.append(group)
     return out[:_ALTERNATIVES]

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What differs between recordings of one arm: a short list of what may, held against noise.
+What differs between recordings of one arm: a short list of what may, compared with noise.
 
 The first recording is what the others are compared with. Every error allowed to differ is a
 candidate in each later recording; those worth more than they cost are fitted along with the
@@ -46,7 +46,7 @@ from ..result import Changed, Site
 ROWS = 9000
 """Rows on which changes are chosen."""
 SURE = 3.0
-"""A change is told from this many standard errors on; of several numbers, the root of their mean
+"""A change is reported from this many standard errors on; of several numbers, the root of their mean
 chi-square. One in four hundred by chance."""
 REWEIGHTED = 6
 """Fits with the weights of the last: so many until an outlier of a hundred noises has lost its own."""
@@ -240,7 +240,7 @@ def _site(change: Change) -> tuple[int, str, str | None]:
     return change.recording, change.effect.name, change.effect.site
 
 
-def told(
+def list_changes(
     problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
 ) -> tuple[Changed, ...]:
     """
@@ -300,8 +300,8 @@ def _columns(
     return columns, np.concatenate([frame_prior(problem, model)[0], prior])
 
 
-def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]:
-    """Return what may differ but cannot be told by these recordings, in words."""
+def list_undetectable(problem: Problem, model: Model, families: Sequence[str]) -> list[str]:
+    """Return what may differ but cannot be detected in these recordings, in words."""
     candidates = _candidates(problem, model.robot, families)
     if not candidates:
         return []

@@ -141,8 +141,10 @@ def _weighed(every: Sequence[Alternative], temperature: float) -> CandidateSet:
     log_bayes = np.array([one.log_bayes for one in out.values()])
     weights = np.exp((log_bayes - most) / temperature)
     weights /= weights.sum()
-    told = [replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)]
-    return tuple(sorted(told, key=lambda r: -r.probability))
+    weighed = [
+        replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)
+    ]
+    return tuple(sorted(weighed, key=lambda r: -r.probability))
 
 
 def with_leads(

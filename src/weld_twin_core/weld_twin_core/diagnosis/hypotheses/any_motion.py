@@ -56,7 +56,7 @@ def same_error(
     Return whether one of two constant errors can always do what the other does.
 
     one, other: their families and joints count, not their values.
-    align: frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
+    align: frames that are fitted, 'base' and 'tool': what these take up distinguishes nobody.
     both: ask that each can do what the other does.
     """
     a, b = columns(robot, one), columns(robot, other)

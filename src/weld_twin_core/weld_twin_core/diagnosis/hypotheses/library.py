@@ -15,7 +15,7 @@ from ...effects.registry import REGISTRY
 from ...twin.features import joints_of
 from ..algebra.columns import Columns, Maker, Piece
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import REASON, hardly_moves, moved_most, orders_told
+from ..algebra.still_joints import REASON, hardly_moves, moved_most, separable_orders
 from ..result import Site
 from .any_motion import set_instead
 from .seed_systems import Part, Role, SeedSystems, Unit, parts
@@ -119,7 +119,7 @@ class _Shelf:
     def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
         """Return the instances that are looked for, and among how many they were chosen."""
         if kind.traits.waves is not None and joint is not None:
-            most = min(kind.traits.waves.dense, orders_told(self.features, joint))
+            most = min(kind.traits.waves.dense, separable_orders(self.features, joint))
             lines = kind.search.lines(joint, np.arange(1.0, most + 1.0))
             return lines, float(len(lines))
         k, pull = moved_most(self.features, joint), None

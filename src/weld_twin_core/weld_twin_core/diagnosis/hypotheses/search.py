@@ -157,7 +157,7 @@ def _chosen(
         if crowded or names(now.model) == before or attempt == ROUNDS - 1:
             break
         model = now.model
-        del work, now, grown  # or two libraries would be held at once
+        del work, now, grown  # or two libraries would be in memory at once
         work, now = workspace(few, model, exclude, beliefs)
     return work, now, refused, crowded
 
@@ -193,7 +193,7 @@ def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[C
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:
-    """Return what tells one set of found effects from another."""
+    """Return the key of a set of found effects."""
     return sorted(
         ((*Site.of(e), e.fit.coordinates().size) for e in model.found),
         key=lambda item: (item[0], item[1] or '', item[2]),

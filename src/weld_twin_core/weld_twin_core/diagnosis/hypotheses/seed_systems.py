@@ -25,7 +25,7 @@ from ..result import Site
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above
-rounding, far below what a column must carry to be told from the others."""
+rounding, far below what a column must add to differ from the others."""
 PERFECT = 1e-12
 """Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
 FEWEST = 3.0

@@ -15,7 +15,7 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.columns import designed
-from ..algebra.fit import Fit, design, fit, foretold
+from ..algebra.fit import Fit, design, fit, predict_fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
@@ -85,7 +85,7 @@ class Workspace:
             known[k] = self.fitted(now.model.without(k))
         return known[k]
 
-    def foretold_without(self, now: Fit) -> list[tuple[float, float]]:
+    def predict_without(self, now: Fit) -> list[tuple[float, float]]:
         """
         Return of every found effect what a fit without it will leave, and how much it changes.
 
@@ -98,7 +98,7 @@ class Workspace:
             end = place + effect.fit.coordinates().size
             others = own.chosen(np.delete(np.arange(own.count), slice(place, end)))
             bare = now.model.without(k)
-            residual, rss = foretold(self.problem, bare, self.scale, others)
+            residual, rss = predict_fit(self.problem, bare, self.scale, others)
             out.append((rss, float(np.sqrt(((residual - now.residual) ** 2).mean()))))
             place = end
         return out
@@ -182,7 +182,7 @@ def forward(
 
     now: with what the model has already.
     most: stop after this many units.
-    tick: told what was found, for progress.
+    tick: called with what was found, for progress.
     """
     gone = set[Site]()
     made_room = _selected(work, now, most, tick, gone)
@@ -312,7 +312,7 @@ def backward(work: Workspace, now: Fit) -> Fit:
     """
     beliefs = work.beliefs
     while now.model.found:
-        less, count, hopeless = work.foretold_without(now), work.effective(now), work.hopeless(now)
+        less, count, hopeless = work.predict_without(now), work.effective(now), work.hopeless(now)
         worth = dict[int, float]()
         most = beliefs.negligible if len(less) > 1 else beliefs.invisible
         for k in (k for k, (rss, _) in enumerate(less) if rss < hopeless):

@@ -5,7 +5,7 @@ Each cause level by level, with its share of the squared gap.
 
 Every effect that counts as named stands by itself, whatever the status, and so does a place that
 curves stand for. What is left beside them is one entry more. Shares are what every cause takes off the
-squared gap on stretches that were not fitted, in proportion to how far it moves the tool along with
+squared gap in folds that were not fitted, in proportion to how far it moves the tool along with
 all of them together; with the noise and with what is left they add up to one. What each adds is told
 sample by sample, too, so that causes can be thought away.
 """
@@ -33,10 +33,10 @@ from .free_form import FreeForm, Part
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
 STUDENT = 1.86
-"""Student's t for 90 % and the 8 stretches that take turns."""
+"""Student's t for 90 % and the 8 folds."""
 
 SHARED = 0.002
-"""Share by which an interval reaches further on each side than its stretches tell: they share the
+"""Share by which an interval reaches further on each side than its folds show: they share the
 noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered; of 167 others
 88 % are."""
 
@@ -61,7 +61,7 @@ def causes(
     floor: RMS of the noise alone [m].
     placing: what tells the places of an unknown gap; of any other nothing.
     """
-    reported = _told_claims(result, table, verdict)
+    reported = _claims_of_names(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
     claims, rest = _nameless(result, reported, verdict, curved, placing, beliefs)
     squares = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
@@ -136,8 +136,8 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _told_claims(result: Search, table: Sequence[Row], verdict: Verdict) -> list[Cause]:
-    """Return a claim for every effect that is told, or for every group of many small ones."""
+def _claims_of_names(result: Search, table: Sequence[Row], verdict: Verdict) -> list[Cause]:
+    """Return a claim for every effect that is reported, or for every group of many small ones."""
     model = result.final.model.found
     if result.dense:
         return _claims_of_many(model, verdict)
@@ -170,31 +170,31 @@ def _nameless(
         return reported, _rest([], beliefs) if len(reported) < len(result.candidate_sets) else None
     model = result.final.model.found
     places = _by_place(placing.parts)
-    held = _carried_by(places, curved) if places else {}
+    curves_at = _curves_by_place(places, curved) if places else {}
     claims, remaining = list(reported), list[Part]()
     taken = {at for claim in reported for at in claim.members}
     if taken_out := result.lacking:
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
         stand_in = _stand_in(taken_out[0], beside, model)
         return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)
-    by_curves = {at for members in held.values() for at in members}
+    by_curves = {at for members in curves_at.values() for at in members}
     for k, effect in enumerate(model if curved is not None else ()):
         if k in taken | by_curves or effect.traits.bends:
             continue
-        if not effect.traits.cause and held.get(effect.at):
+        if not effect.traits.cause and curves_at.get(effect.at):
             # How a set-up moved is nuisance, and no name beside the curves of that place.
-            held[effect.at] += (k,)
+            curves_at[effect.at] += (k,)
             continue
         name = {Site.of(effect): 1.0} if effect.traits.cause else {}
         claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, name))
     for place, own in places.items():
-        if not held[place]:
+        if not curves_at[place]:
             remaining += own
             continue
-        curves = {Site.of(model[k]): 1.0 for k in held[place] if k in by_curves}
+        curves = {Site.of(model[k]): 1.0 for k in curves_at[place] if k in by_curves}
         levels = _place_of(place, own, beliefs), _dependence_of(own), curves
         share = float(sum(part.share for part in own))
-        claims.append(_cause(held[place], *levels, share=share))
+        claims.append(_cause(curves_at[place], *levels, share=share))
     return claims, _rest(remaining, beliefs)
 
 
@@ -205,7 +205,7 @@ def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> C
 
 
 def _rest(remaining: list[Part], beliefs: Beliefs) -> Cause:
-    """Return what is left beside everything told, where the most of it is."""
+    """Return what is left beside everything reported, where the most of it is."""
     if not remaining:
         return _cause((), {}, {}, {})
     places = _by_place(remaining)
@@ -214,7 +214,9 @@ def _rest(remaining: list[Part], beliefs: Beliefs) -> Cause:
     return _cause((), _place_of(first, own, beliefs), _dependence_of(own), {})
 
 
-def _carried_by(places: dict[str, list[Part]], alternative: Curved | None) -> dict[str, Members]:
+def _curves_by_place(
+    places: dict[str, list[Part]], alternative: Curved | None
+) -> dict[str, Members]:
     """Return the curves of the model that stand for each place; the largest has what is over."""
     out: dict[str, Members] = dict.fromkeys(places, ())
     if alternative is None:
@@ -224,7 +226,7 @@ def _carried_by(places: dict[str, list[Part]], alternative: Curved | None) -> di
     owner = {part.group.at: place for place, parts in places.items() for part in parts}
     at = len(alternative.kept)
     for part in alternative.form.parts:
-        members = tuple(range(at, at + len(part.group.carried)))
+        members = tuple(range(at, at + len(part.group.movable_curves)))
         out[owner.get(part.group.at, largest)] += members
         at += len(members)
     return out
@@ -317,7 +319,7 @@ def _shares(
 def _spread(
     squares: tuple[Array, Array], parts: Array, claims: Sequence[Cause], labels: np.ndarray
 ) -> Array:
-    """Return the standard error of every share, by leaving out one stretch at a time."""
+    """Return the standard error of every share, by leaving out one fold at a time."""
     names = np.unique(labels)
     if names.size < 3 or not claims:
         return np.full(len(claims), 0.5)
@@ -327,7 +329,7 @@ def _spread(
 
 def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | None:
     """
-    Return what every cause adds to the residual on unseen stretches; None where none can be told.
+    Return what every cause adds to the residual in unseen folds; None where it cannot be estimated.
 
     A cause is taken off as it acts along with the others, and the frames that are fitted anew take
     their part of it. What the fits of fewer effects make of each other is a small rest; it is

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Curves for what has no name: chosen, fitted, judged as any model is, and carried or not."""
+"""Curves for what has no name: chosen, fitted, judged as any model is, and kept or not."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROWS = 6000
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """A free-form explanation, and the model that carries it."""
+    """A free-form explanation, and the model with its curves."""
 
     form: FreeForm
     kept: tuple[Effect, ...]
@@ -42,9 +42,9 @@ class Curved:
 
 def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     """
-    Return curves for what a verdict leaves beside the names that it tells; None where there are none.
+    Return curves for what a verdict leaves beside its names; None where there are none.
 
-    What carries to no other posture may still be told from neighbours in time.
+    What holds in no other posture may still be predicted from neighbours in time.
 
     result: the set-up's own motion that it holds stays beside the curves.
     verdict: of one that names something nothing is left.
@@ -88,7 +88,7 @@ def _beside(
     return Curved(form, bare.model.found, changed, unseen)
 
 
-def carried(
+def choose_model(
     result: Search,
     unseen: Unseen,
     shrink: Shrink,
@@ -98,7 +98,7 @@ def carried(
     beliefs: Beliefs,
 ) -> tuple[Search, Unseen, Shrink, Verdict]:
     """
-    Return the model to carry on with, its predictions on unseen stretches, its shrink, the verdict.
+    Return the model to go on with, its predictions in unseen folds, its shrink, the verdict.
 
     result, unseen, shrink: of the effects found.
     alternative: the free-form explanation; carried where the verdict is 'unknown' and it predicts
@@ -114,7 +114,7 @@ def carried(
     least = 1.0 if verdict.sets else beliefs.better
     if shrink.rms_after_m <= least * shrink.rms_before_m and not nothing:
         return result, unseen, shrink, verdict
-    # Without a name there is no reason to carry what makes unseen data worse.
+    # Without a name there is no reason to keep what makes unseen data worse.
     # The frames alone were fitted when the noise was not known yet.
     bare = result.problem.whitened(result.problem.residuals(result.baseline.model), result.scale)
     final = replace(result.baseline, residual=bare)
@@ -125,7 +125,7 @@ def carried(
 
 
 def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
-    """Return whether curves are carried: for names that do not stand, or clearly beside."""
+    """Return whether the model has curves: for names that do not stand, or clearly beside."""
     there = alternative.unseen
     before, after = named.squares(named.whole), there.squares(there.whole)
     if not verdict.sets:
@@ -139,7 +139,7 @@ def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> 
     Return 'unknown' in the place of 'none' where free curves predict what looks like noise.
 
     verdict: of any other status, nothing changes.
-    alternative: the free-form explanation, whether or not it can be carried to another motion.
+    alternative: the free-form explanation, whether or not it holds on another motion.
     """
     if verdict.status != 'none' or alternative is None:
         return verdict
@@ -159,7 +159,7 @@ ROUNDED, JUMPING = 0.6, 0.4
 direction has it, where nothing else is found there. A judgement."""
 
 
-def placed(
+def locate_gap(
     result: Search,
     verdict: Verdict,
     alternative: Curved | None,
@@ -169,10 +169,10 @@ def placed(
     """
     Return the groups that tell place and dependence of an unknown gap; of any other nothing.
 
-    They explain what is left beside everything that is told.
+    They explain what is left beside everything that is reported.
 
     result: the effects found, before curves take their place.
-    alternative: the free-form explanation beside what is told. Where there is none, what was found
+    alternative: the free-form explanation beside what is reported. Where there is none, what was found
     to be left beside the model is a place, and so are joints that noise comes from.
     """
     if verdict.status != 'unknown':

@@ -75,19 +75,23 @@ class FreeForm:
     @property
     def curves(self) -> tuple[Effect, ...]:
         """Return the curves to fit, their values zero."""
-        return tuple(curve for part in self.parts for curve in part.group.carried)
+        return tuple(curve for part in self.parts for curve in part.group.movable_curves)
 
     @property
     def precision(self) -> Array:
         """Return the prior precision of the curves' values, in units of noise, shape (K,)."""
-        held = [part.group.held(part.ridge) for part in self.parts if part.group.carried]
+        held = [
+            part.group.prior_precision(part.ridge)
+            for part in self.parts
+            if part.group.movable_curves
+        ]
         return np.concatenate([np.zeros(0), *held])
 
 
 STRETCHES = 10
 """Stretches of time that take turns in being unseen."""
 SHORT = 60
-"""Short stretches of which every tenth is left out together: what wanders is told from its
+"""Short stretches of which every tenth is left out together: what wanders is predicted from its
 neighbours in time, though not a minute later."""
 
 
@@ -265,7 +269,7 @@ def alternative_weights(
 
     work: groups and their folds.
     members: the groups chosen.
-    k: which of them is held against the others.
+    k: which of them is compared with the others.
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))

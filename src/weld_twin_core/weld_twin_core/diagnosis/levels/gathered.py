@@ -37,9 +37,9 @@ def gathered(
     """
     Return the evidence for a verdict.
 
-    result, unseen: the search, and unseen stretches under its final model.
+    result, unseen: the search, and unseen folds under its final model.
     leftover: what generic columns still find beside it.
-    shrink: on held-out recordings or on stretches taking their turn.
+    shrink: on held-out recordings or by cross-validation.
     families: what each kind accounts for, where many small errors were fitted together.
     """
     robot, parts = result.final.model.robot, unseen.targets[1:]

@@ -34,7 +34,7 @@ from ..unseen.unseen_stretches import Unseen
 from ..verdict.evidence import Scatter
 
 LEAST = 80
-"""Measurements of a recording from which on variances are told: ten for each stretch."""
+"""Measurements of a recording from which on variances are estimated: ten for each fold."""
 GROSS = 6.0
 """Squared length over its median from which on a difference holds a stray reading: of three
 coordinates one in 500 does by chance."""
@@ -105,7 +105,7 @@ def _ways(maker: Features) -> Array:
 
 def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
-    Return the variances' normal equations, (stretches, K, K) and (stretches, K), and sizes, (K + 1,).
+    Return the variances' normal equations, (folds, K, K) and (folds, K), and sizes, (K + 1,).
 
     Sizes are the sums of squares of each way and of the differences.
 
@@ -134,7 +134,7 @@ def _shared_out(normal: Array, right: Array) -> Array:
 
 
 def _errors(normal: Array, right: Array) -> Array:
-    """Return the standard errors of the variances, by leaving out one stretch at a time."""
+    """Return the standard errors of the variances, by leaving out one fold at a time."""
     whole, pulls = normal.sum(axis=0), right.sum(axis=0)
     tries = np.array(
         [_shared_out(whole - a, pulls - b) for a, b in zip(normal, right, strict=True)]

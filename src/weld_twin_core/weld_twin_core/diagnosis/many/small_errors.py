@@ -38,7 +38,7 @@ from ..algebra.fit import (
 )
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import hardly_moves, moved_most, orders_told
+from ..algebra.still_joints import hardly_moves, moved_most, separable_orders
 from ..beliefs import Beliefs
 from ..hypotheses.library import candidate_kinds
 from ..unseen.unseen_stretches import Unseen
@@ -103,7 +103,7 @@ def _everything(
                 each = {seed.key: seed for seed in reversed(kind.search.small(view, joint, most))}
                 small = [have.get(key, seed) for key, seed in reversed(each.items())]
             elif np.ptp(view.joint(view.robot.index(str(joint)))) >= beliefs.wave_range:
-                reported = orders_told(features, str(joint))
+                reported = separable_orders(features, str(joint))
                 small = kind.search.small(view, joint, min(most, reported))
             else:
                 small = []
@@ -239,7 +239,7 @@ def lines_of(maker: Maker, effect: Effect, least: float) -> Lines | None:
     low, high = _ends(maker, effect) if waves is not None else (0.0, 0.0)
     if waves is None or high - low < least:
         return None
-    most = min(waves.highest, orders_told(maker.features, str(effect.site)))
+    most = min(waves.highest, separable_orders(maker.features, str(effect.site)))
     orders = np.arange(waves.dense + 1.0, most + 1.0)
     return Lines.of(maker, effect, orders) if orders.size else None
 

@@ -9,7 +9,7 @@ least on unseen data first, until no other takes a tenth off. Kinds that resembl
 only together, as wrong lengths and twists do: where none takes enough off by itself, two may. A kind
 that not every arm has is one of them only where unseen data get worse without it beside all that every
 arm has. Each is then taken out of what was chosen, with all others and the frames fitted anew: a kind
-is needed where unseen data get worse. What would do as well in its place is told beside it.
+is needed where unseen data get worse. What would do as well in its place is reported beside it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .small_errors import believed
 TINY = 1e-9
 """Least error [m] divided by: a nanometre, far below any instrument."""
 MOST_LIKE = 2
-"""Kinds told beside one at the most; what more than three would explain is no name."""
+"""Kinds reported beside one at the most; what more than three would explain is no name."""
 
 
 def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
@@ -226,7 +226,7 @@ class _Case:
     def weighed(
         self, name: str, chosen: Sequence[str], sizes: tuple[tuple[Site, float], ...]
     ) -> Family:
-        """Return one kind with all that is told of it."""
+        """Return one kind with all that is reported of it."""
         others, own = self.of_kinds(chosen, but=name), self.members[name]
         every = [*others, *own]
         growths = tuple(self.growth(every, others).tolist())

@@ -35,7 +35,7 @@ from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
 from .dispersion import dispersion
-from .leftover import Foretold, leftover, told_noise
+from .leftover import Predicted, known_noise, leftover
 from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
 ROWS = 9000
@@ -82,9 +82,9 @@ def allowed(
     levers, parts = _levers(problem, model, scale), rows.parts(regions.labels)
     spread = models.covariance * _dispersed(problem, rows, prior, models, parts)
     whole, turning = (models.mean, spread), ~np.asarray(model.robot.prismatic)
-    foretold = Foretold.of(regions, rows.columns, parts, levers, system.given, whole)
-    noise, rough = told_noise(problem, floor), 1.0 if nameless else models.rough
-    remaining = leftover(problem, foretold, turning, noise, rough, _lost(problem, model))
+    predicted = Predicted.of(regions, rows.columns, parts, levers, system.given, whole)
+    noise, rough = known_noise(problem, floor), 1.0 if nameless else models.rough
+    remaining = leftover(problem, predicted, turning, noise, rough, _lost(problem, model))
     fine = _uneven(models.open, what)
     posterior = Posterior(
         what,

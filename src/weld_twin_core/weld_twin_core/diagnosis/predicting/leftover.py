@@ -65,10 +65,10 @@ FEW = 12
 PEAK = 1.7321
 """Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
 STRAYED = 1.5
-"""Times what chance makes of the largest miss of a stretch from which on it is more than chance: the
+"""Times what chance makes of the largest miss in a fold from which on it is more than chance: the
 largest of a hundred varies by a tenth."""
 CLEAR = 2.0
-"""Standard errors by which more must be left there than elsewhere: a bound that is told too wide does
+"""Standard errors by which more must be left there than elsewhere: a bound that is too wide does
 less harm than one too narrow."""
 
 Given = Callable[[Products], tuple[Array, Array]]
@@ -76,7 +76,7 @@ Given = Callable[[Products], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class Predicted:
     """
     Every sample as the other regions of posture foretell it.
 
@@ -84,9 +84,9 @@ class Foretold:
     """
 
     error: Array
-    """What was measured less what was foretold, shape (N, 6)."""
+    """What was measured less what was predicted, shape (N, 6)."""
     ways: Array
-    """In which what was foretold may be off, each of one standard deviation, shape (R, N, 6);
+    """In which what was predicted may be off, each of one standard deviation, shape (R, N, 6);
     (R, N, 3) of points."""
     levers: Array
     """d pose / d joint, shape (n, N, 6)."""
@@ -113,7 +113,7 @@ class Foretold:
         levers: Array,
         given: Given,
         whole: tuple[Array, Array],
-    ) -> Foretold:
+    ) -> Predicted:
         """
         Return what a model foretells of samples that it was not fitted to.
 
@@ -199,7 +199,7 @@ class Rest(NamedTuple):
 
 def leftover(
     problem: Problem,
-    foretold: Foretold,
+    predicted: Predicted,
     turning: NDArray[np.bool_],
     noise: float | None,
     rough: float,
@@ -208,43 +208,43 @@ def leftover(
     """
     Return the standard deviations of what is left over.
 
-    foretold: of the samples of the problem.
+    predicted: of the samples of the problem.
     turning: joints that turn, shape (n,); what slides has no gear.
-    noise: of a measured coordinate [m], told with the data or seen in them.
+    noise: of a measured coordinate [m], given with the data or seen in them.
     rough: share of the arm's small errors that are of a usual size.
     lost: how much motion was found to be lost in every joint, shape (n,) [rad or m].
     """
-    if foretold.seen[:, :3].all(axis=1).any():
-        spread = _shared(*foretold.axes(slice(0, 3)), turning)
+    if predicted.seen[:, :3].all(axis=1).any():
+        spread = _shared(*predicted.axes(slice(0, 3)), turning)
     else:
         # Faces and lengths show one way each: nothing parts what is left by axes or gears.
-        error, moment, _ = foretold.axes(slice(0, 1))
+        error, moment, _ = predicted.axes(slice(0, 1))
         remaining = max(float((error**2).mean() - moment.mean()), 0.0)
         spread = Spread(float(np.sqrt(remaining)), np.zeros(lost.size), False)
-    error, moment, lever = foretold.axes(slice(3, 6))
+    error, moment, lever = predicted.axes(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     orientation = spread.position
     if error.size:
         moved = lever * spread.gears
         orientation = _size(error, moment + np.einsum('kin,kjn->kij', moved, moved), np.eye(3))
-    common = _in_common(problem, foretold)
+    common = _in_common(problem, predicted)
     share = _of_the_arm(spread.position**2, common, noise, rough, problem.at_rest)
     of_gears = 1.0 if spread.surely else share
-    at_turns = _at_turns(problem, foretold, lost)
+    at_turns = _at_turns(problem, predicted, lost)
     return Rest(
         spread.position * share,
         orientation * share,
         spread.gears * of_gears,
         at_turns,
         # An instrument strays as well, and no more of that is the arm's than of the rest.
-        _peaks(foretold) * of_gears,
+        _peaks(predicted) * of_gears,
     )
 
 
-def _peaks(foretold: Foretold) -> Array:
+def _peaks(predicted: Predicted) -> Array:
     """Return how far each region of posture was off at its worst, beyond chance, shape (K,) [m]."""
-    use = foretold.good & foretold.seen[:, :3].all(axis=1)
-    off, regions = (foretold.error[use, :3] ** 2).sum(axis=1), foretold.region[use]
+    use = predicted.good & predicted.seen[:, :3].all(axis=1)
+    off, regions = (predicted.error[use, :3] ** 2).sum(axis=1), predicted.region[use]
     out = []
     for region in np.unique(regions):
         here = off[regions == region]
@@ -255,7 +255,7 @@ def _peaks(foretold: Foretold) -> Array:
     return np.array(out)
 
 
-def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:
+def _at_turns(problem: Problem, predicted: Predicted, lost: Array) -> Array:
     """
     Return how far joints may be off where they have just turned around, shape (n,) [rad or m].
 
@@ -264,12 +264,12 @@ def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:
     be lost: evenly likely ones have this standard deviation. Else it is as much as the noise may hide.
     """
     out = np.zeros(lost.size)
-    use = foretold.good & foretold.seen[:, :3].all(axis=1)
+    use = predicted.good & predicted.seen[:, :3].all(axis=1)
     if not lost.any() or problem.at_rest or not use.any():
         return out
-    ways = foretold.ways[:, use, :3]
+    ways = predicted.ways[:, use, :3]
     open_ = np.einsum('rki,rki->ki', ways, ways)
-    excess = (foretold.error[use, :3] ** 2 - open_).mean(axis=1)
+    excess = (predicted.error[use, :3] ** 2 - open_).mean(axis=1)
     near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[use]
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
@@ -279,7 +279,7 @@ def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:
         doubt = CLEAR * np.sqrt(here.var() / here.size + beside.var() / beside.size)
         more = here.mean() - beside.mean()
         if more <= doubt:
-            size = (foretold.levers[i, use, :3][near[:, i]] ** 2).mean()
+            size = (predicted.levers[i, use, :3][near[:, i]] ** 2).mean()
             out[i] = min(out[i], PEAK * np.sqrt(max(more + doubt, 0.0) / max(size, 1e-300)))
     return out
 
@@ -359,7 +359,7 @@ def _likelihood(errors: Array, covariances: Array) -> float:
     return -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
 
 
-def _in_common(problem: Problem, foretold: Foretold) -> float:
+def _in_common(problem: Problem, predicted: Predicted) -> float:
     """
     Return the share of what is left that neighbours have in common, beyond open directions and chance.
 
@@ -369,16 +369,16 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
     motion may still hide some: as much as is believed where chance is least. Shifts count, or all that a
     contact sees.
     """
-    told, regions = list[tuple[float, float, float]](), np.unique(foretold.region)
-    sign = 1.0 if foretold.at_rest else -1.0
+    estimates, regions = list[tuple[float, float, float]](), np.unique(predicted.region)
+    sign = 1.0 if predicted.at_rest else -1.0
     sums: dict[int, list[Array]] = {}
     foreseen = np.sqrt(2.0 / regions.size)  # how far a variance of so many draws may be off
     for region in regions:
-        here = np.flatnonzero((foretold.region == region) & foretold.good)
+        here = np.flatnonzero((predicted.region == region) & predicted.good)
         for size, order, starts in _neighbours(problem, here):
-            error, ways = foretold.left[order, :3], foretold.own[:, order, :3]
+            error, ways = predicted.left[order, :3], predicted.own[:, order, :3]
             alone = np.stack(
-                [error**2, np.einsum('rki,rki->ki', ways, ways), foretold.seen[order, :3]]
+                [error**2, np.einsum('rki,rki->ki', ways, ways), predicted.seen[order, :3]]
             )
             each = np.add.reduceat(alone, starts, axis=1)
             together = [
@@ -395,13 +395,13 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
         chance = np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
         common = max(agree - open_, min(open_, 0.0) - agree)
         whole, chance = max(square - each_open, common, 1e-300), max(chance, 1e-300)
-        told.append((common / chance, chance / whole, (agree - open_) / whole))
-    if not told:
-        return float(not foretold.at_rest)
-    steps, chance, _ = max(told)
+        estimates.append((common / chance, chance / whole, (agree - open_) / whole))
+    if not estimates:
+        return float(not predicted.at_rest)
+    steps, chance, _ = max(estimates)
     if steps > AGREED:
         return steps * chance
-    return 0.0 if foretold.at_rest else _believed(*min(one[1:] for one in told))
+    return 0.0 if predicted.at_rest else _believed(*min(one[1:] for one in estimates))
 
 
 def _believed(chance: float, common: float) -> float:
@@ -460,8 +460,8 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     return float(np.sqrt(high))
 
 
-def told_noise(problem: Problem, floor: NoiseFloor) -> float | None:
-    """Return the instrument's noise [m], told with the data or seen in them; None without."""
+def known_noise(problem: Problem, floor: NoiseFloor) -> float | None:
+    """Return the instrument's noise [m], given with the data or seen in them; None without."""
     reported = [
         float(np.median(r.measured.sigma))
         for r in problem.recordings

@@ -174,7 +174,7 @@ def _planned(
         return float(np.median(size[:, -1])), within, float(np.median(beyond[:, -1]))
 
     taken: list[int] = []
-    told = [sure()]
+    certainties = [sure()]
     for _ in range(count):
         gain = _gains(seen, offered, noise)
         gain[taken] = -np.inf
@@ -184,8 +184,8 @@ def _planned(
         # What is still open of every way, as ways of one standard deviation again.
         root = np.linalg.cholesky(np.eye(len(shown)) - shown)
         seen, offered, far = seen @ root, offered @ root, far @ root
-        told.append(sure())
-    return MeasurementPlan(region[1][taken], *np.array(told).T)
+        certainties.append(sure())
+    return MeasurementPlan(region[1][taken], *np.array(certainties).T)
 
 
 def _sizes(ways: Array, rest: Array) -> Array:

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Measured efforts of the joints, held against the model's statics: sign, unit, payload, torque constant.
+Measured efforts of the joints, compared with the model's statics: sign, unit, payload, torque constant.
 
 Poses see a measured torque only as its product with a compliance. So a wrong torque constant, and a
 load that nobody declared, show here or nowhere: by what differs between effort and statics.

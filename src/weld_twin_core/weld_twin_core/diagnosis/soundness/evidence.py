@@ -44,7 +44,7 @@ class Finding(NamedTuple):
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def as_unsound(self, *, applied: bool) -> Unsound:
-        """Return what is told of a mistake in a diagnosis, undone or not."""
+        """Return what a diagnosis reports of a mistake, undone or not."""
         done = as_entry(self.mend)
         return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike, done)
 

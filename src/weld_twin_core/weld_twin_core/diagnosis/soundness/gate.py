@@ -86,7 +86,7 @@ class Examined:
         Return the same, unsound where something gave way in one of several recordings.
 
         A slip counts one time for all recordings, so no search can weigh one of them against the
-        library. It is told only where what the library explains best, ``model``, still leaves it:
+        library. It is reported only where what the library explains best, ``model``, still leaves it:
         loops of lost motion and play that the load turns over look like steps until they are
         fitted.
         """

@@ -84,7 +84,7 @@ def positions_as(given: Given, factor: Array) -> Given:
 
     def scaled(seen: Measurements) -> Measurements:
         turn = None if np.prod(factor) < 0.0 else seen.rotation
-        # How sure they are was told of what has proved to be something else.
+        # How sure they are was given for what has proved to be something else.
         return Measurements(seen.t, seen.position * np.asarray(factor), turn, seen.sigma)
 
     return _seen_as(given, scaled)
@@ -166,7 +166,7 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     """
     Return what was given with the arm's own stamps of recording k on the measurements' clock.
 
-    The measurements keep their stamps, so that whatever is told of an instant is told in theirs.
+    The measurements keep their stamps, so that every reported instant is in theirs.
 
     late: how late its measurements are in the middle [s].
     rate: how much later they get with every second of theirs [s/s].

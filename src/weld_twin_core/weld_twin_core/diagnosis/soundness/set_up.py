@@ -33,7 +33,7 @@ TORCH = 0.1
 
 
 def setup(case: Case) -> Sequence[Finding]:
-    """Return steps and settling of the set-up; those that are dated are causes, and told there."""
+    """Return steps and settling of the set-up; those that are dated are causes, and reported there."""
     out = []
     for each in case.changes:
         if each.size > TAKEN_UP * case.largest:

@@ -55,7 +55,7 @@ _WORDS: dict[type[Effect], tuple[str, str, str, str]] = {
         'See to belt, coupling and encoder of {0}, master it and measure again',
     ),
 }
-"""How each is told: its kind, what happened, how it is called beside others, what to do about it."""
+"""How each is reported: its kind, what happened, how it is called beside others, what to do about it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@
 Contacts that are not what they are called: another socket, a slip, a place that was moved.
 
 An arm as wrong as machines are is fitted first, all its constant errors and springs together; what
-is far off then is no error of the arm. Such postures are told of and not fitted as what they were
+is far off then is no error of the arm. Such postures are reported and not fitted as what they were
 called: those of another socket are counted there, a place that moved counts as two, a slip is left
 out. Where known lengths cannot be, nothing is mended: files were mixed up.
 """
@@ -35,7 +35,7 @@ SUREST = 1e-6
 
 
 class Touched(NamedTuple):
-    """What is diagnosed, what was told and mended, and what cannot be mended."""
+    """What is diagnosed, what was reported and mended, and what cannot be mended."""
 
     problem: Problem
     model: Model
@@ -223,7 +223,7 @@ def _moved_run(points: Array) -> tuple[int, int, float, float]:
     best = int(gain.argmax())
     first, last = int(i[best]), int(j[best])
     shift = float(np.linalg.norm(part[best]) * each[best])
-    # The shorter part is what is told of.
+    # The shorter part is what is reported.
     if first == 0 and last > len(x) // 2:
         first, last = last, len(x)
     return first, last, shift, float(gain[best]) / max(float((x**2).sum()), TINY**2)

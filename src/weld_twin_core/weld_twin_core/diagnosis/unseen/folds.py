@@ -5,7 +5,7 @@ Parts of the data that take turns in being unseen, and what a model gains on the
 
 Parts are stretches of time, as `Problem.block_labels` cuts them, and regions of posture: what carries
 over to the next minute need not carry over to where the arm has not been. Neighbouring samples err
-alike, so that it is parts that are counted wherever an error is told.
+alike, so that it is parts that are counted wherever an error is reported.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from ...arrays import Array
 from ..algebra.problem import PLACES, Problem
 
 STRETCHES = 8
-"""Stretches left out in turn: enough for a standard error, few enough that each tells much."""
+"""Folds in time: enough for a standard error, few enough that each shows much."""
 MOST_IN_ONE = 0.5
-"""Share of a recording in one region from which on the others do not tell its base."""
+"""Share of a recording in one region from which on the others do not show its base."""
 
 
-def ways_to_divide(problem: Problem, stretches: int = STRETCHES) -> list[Array]:
+def ways_to_divide(problem: Problem, folds: int = STRETCHES) -> list[Array]:
     """
     Return the part of every row, int, shape (rows,), for each way to divide the rows.
 
     Stretches of time, then regions of posture; these not where places of contacts are the parts, as
     a place would lie on both sides.
 
-    stretches: how many, about.
+    folds: how many, about.
     """
-    by_time = problem.block_labels(stretches)
+    by_time = problem.block_labels(folds)
     if problem.untracked and problem.places >= PLACES:
         return [by_time]
     return [by_time, posture_regions(problem)]

@@ -81,11 +81,11 @@ class Group:
     """Curves that do on any motion what plain columns do on this one."""
 
     @property
-    def carried(self) -> tuple[Effect, ...]:
+    def movable_curves(self) -> tuple[Effect, ...]:
         """Return the curves that take the group along to another motion; none for a few kinds."""
         return self.curves or self.carriers
 
-    def held(self, ridge: float) -> Array:
+    def prior_precision(self, ridge: float) -> Array:
         """Return the prior precision of the carried curves' values, in units of noise."""
         if self.curves:
             return ridge * self.scales**2

@@ -33,9 +33,9 @@ from .folds import jackknife, posture_regions
 from .unseen_stretches import Unseen
 
 STUDENT = 2.36
-"""Student's t for 95 % and the 8 stretches that take turns."""
+"""Student's t for 95 % and the 8 folds."""
 FEWEST = 3
-"""Stretches from which on they tell a spread at all."""
+"""Folds from which on they show a spread at all."""
 STRAYS, MANY_FOR_ONE = 3, 20
 """Readings that may be left out of held-out stations, three at most and one in twenty: where one
 in a hundred strays, 70 stations have two or more in one recording of six."""
@@ -45,7 +45,7 @@ def held_out_shrink(
     result: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> Shrink:
     """
-    Return the gap before and after, on the held-out bags or on stretches taking their turn.
+    Return the gap before and after, on the held-out bags or by cross-validation.
 
     result: the fitted effects and the noise they leave.
     """
@@ -86,7 +86,7 @@ def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> f
 
 
 def _log_sizes(squares: Array, labels: Array) -> Array:
-    """Return the logarithm of an RMS with each stretch left out in turn."""
+    """Return the logarithm of an RMS with each fold left out in turn."""
     means = [squares[labels != name].mean() for name in np.unique(labels)]
     return np.asarray(0.5 * np.log(np.maximum(means, 1e-300)))
 
@@ -132,7 +132,7 @@ def _rms(squares: Array) -> float:
 def _waterfall(
     unseen: Unseen, model: Model
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
-    """Return RMS on unseen stretches as families are added, the best alone first, and of each alone."""
+    """Return RMS in unseen folds as families are added, the best alone first, and of each alone."""
     members: dict[str, list[int]] = {}
     single = len(model.found) <= 8
     for k, effect in enumerate(model.found):
@@ -150,7 +150,7 @@ def _waterfall(
 def _on_bags(
     result: Search, holdout: Sequence[Recording], other_setup: float
 ) -> tuple[Array, Array, Array]:
-    """Return squared errors before and after on held-out bags, and a stretch for every sample."""
+    """Return squared errors before and after on held-out bags, and the fold of every sample."""
     before: list[Array] = []
     after: list[Array] = []
     labels: list[Array] = []
@@ -173,8 +173,8 @@ def _on_bags(
             good = trusted(robust_scale(problem, parts).weights, max(few, 1))[0]
         before.append(pair[0][good])
         after.append(pair[1][good])
-        stretch = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
-        labels.append(stretch + 8 * len(labels))
+        fold = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
+        labels.append(fold + 8 * len(labels))
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
 
 
@@ -230,11 +230,11 @@ def ratio_interval(
     farthest: float = np.inf,
 ) -> tuple[float, tuple[float, float]]:
     """
-    Return RMS after over before and its 95 % interval, by leaving out one stretch at a time.
+    Return RMS after over before and its 95 % interval, by leaving out one fold at a time.
 
-    Jackknife over stretches, so that neighbouring samples do not count as independent. Stretches
+    Jackknife over folds, so that neighbouring samples do not count as independent. Stretches
     of one motion say little of another motion: how far the ratio is from that on the recordings
-    fitted, each stretch unseen, is one draw of that spread, and its square is added to the
+    fitted, each fold unseen, is one draw of that spread, and its square is added to the
     variance.
 
     before, after: squared errors on unseen data, shape (samples,).

@@ -4,7 +4,7 @@
 Where the gap lies, what it depends on, and whether something is left that no named effect explains.
 
 All groups of columns without a formula are tried without the effects. Only a few are tried beside the
-model: of many, one fits noise by chance. If one predicts unseen stretches better beside the
+model: of many, one fits noise by chance. If one predicts unseen folds better beside the
 model, the residual has structure, and the groups that bring it say what it depends on.
 """
 
@@ -46,7 +46,7 @@ REGIME_OF = {
 }
 """The regime in which each dependence shows."""
 STRETCHES = 12
-"""Stretches of time that the gap is told for: as many as a figure can show."""
+"""Stretches of time for which the gap is reported: as many as a figure can show."""
 
 
 def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Where:
@@ -107,8 +107,8 @@ def _path(
     for recording, part, kept in zip(problem.recordings, parts, good, strict=True):
         squares = (part[:3] ** 2).sum(axis=0)
         count = max(1, round(STRETCHES * squares.size / max(sum(problem.samples), 1)))
-        for stretch in np.array_split(np.arange(squares.size), count):
-            index = stretch[kept[stretch]]
+        for part in np.array_split(np.arange(squares.size), count):
+            index = part[kept[part]]
             if index.size:
                 t = recording.seen.t[index]
                 share = float(squares[index].sum()) / max(total, 1e-300)
@@ -139,13 +139,13 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
     return {'along_m': float(rms[0]), 'across_m': float(rms[1]), 'normal_m': float(rms[2])}
 
 
-TOLD = 3
-"""Things that what remains depends on, told at the most; further ones are echoes of these."""
+MOST_DEPENDENCES = 3
+"""Things that what remains depends on, reported at the most; further ones are echoes of these."""
 
 
 def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> Structure:
     """
-    Return what groups without a formula add on stretches not used for fitting.
+    Return what groups without a formula add in folds not used for fitting.
 
     unseen: of the model.
     baseline: of the model without any effect that was found.
@@ -156,7 +156,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     before = first.errors(first.residual).sum()
     found, of_gap = list[tuple[Gain, Group]](), dict[tuple[str, str], float]()
     joints = model.robot.joint_names
-    # Where no instrument measured, and nothing shows where the base stands, joints alone are told of.
+    # Where no instrument measured, and nothing shows where the base stands, joints alone are reported.
     elsewhere = problem.placed or not problem.untracked
     for group in all_groups(problem, model, unseen.scale):
         if group.at in joints:
@@ -172,9 +172,11 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    told = [(one, g) for one, g in found if one.share > least and one.steady > certain][:TOLD]
-    names = tuple(str(group) for _, group in told)
-    of_rest = {(group.at, group.on): one.share for one, group in reversed(told)}
+    reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain][
+        :MOST_DEPENDENCES
+    ]
+    names = tuple(str(group) for _, group in reliable)
+    of_rest = {(group.at, group.on): one.share for one, group in reversed(reliable)}
     chance = 0.0
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
     if counts and may_be_chance(unseen.residual.size, best.share):

@@ -5,7 +5,7 @@ From the table of answers to a verdict: what has a name, and is that more than w
 
 One rule decides. An effect counts as named where its name is likelier right than wrong. What the
 others explain, and what nothing explains, has no name. Where that is more, or where a cause that has
-no name is likelier at work than not, the gap is unknown; what counts as named is told all the same.
+no name is likelier at work than not, the gap is unknown; what counts as named is reported all the same.
 Noise that comes from a joint beyond doubt is such a cause. What depends there on the direction of motion
 is the mean of the same jumps, and no cause beside it.
 """
@@ -26,7 +26,7 @@ LIKELIER = 0.5
 TINY = 1e-18
 """Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
 LISTED = 8
-"""Readings that a sentence tells one by one at the most."""
+"""Readings that a sentence lists one by one at the most."""
 _FOREIGN = (
     'where the evidence was like this, a cause that is not in the library was at work more often '
     'than not, and what was found stood in for a part of it'
@@ -40,9 +40,9 @@ _NO_KIND = (
 @dataclass(frozen=True)
 class Verdict:
     """
-    Status, one set of sites per effect told, families of many small ones, and how sure it is.
+    Status, one set of sites per reported effect, families of many small ones, and how sure it is.
 
-    An effect that counts as named is told whatever the status: 'unknown' says that beside it
+    An effect that counts as named is reported whatever the status: 'unknown' says that beside it
     something is at work that has no name. ``confidence`` is the probability that the whole answer
     is right, ``sure`` says whether it keeps the promise of being wrong hardly ever, and
     ``complete`` is the probability that no cause of any size is missing; all three are told by the

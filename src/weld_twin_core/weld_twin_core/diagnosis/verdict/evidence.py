@@ -27,7 +27,7 @@ class Scatter(NamedTuple):
     share: float
     """Of the squared noise."""
     steady: float
-    """The share in its standard errors between stretches."""
+    """The share in its standard errors between folds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +64,8 @@ class Evidence:
     sizes: tuple[float, ...] = ()
     """RMS by which every effect moves the tool [m]."""
     wandered: tuple[float, ...] = ()
-    """How far the values of every effect move from stretch to stretch, over what noise makes them: a
-    formula that stands in for another wants other values on every stretch."""
+    """How far the values of every effect move from fold to fold, over what noise makes them: a
+    formula that stands in for another wants other values in every fold."""
     rows: float = 1.0
     """Number of independent rows that the effects were chosen on."""
     travel: tuple[float, ...] = ()

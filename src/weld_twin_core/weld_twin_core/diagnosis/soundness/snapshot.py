@@ -104,7 +104,7 @@ class Snapshot:
 
     def rough(self, *, thorough: bool = False) -> Model:
         """Return the model after a quick fit of both frames; thorough: from many starts."""
-        return self._roughly.get(thorough) or rough_models([self], thorough=thorough)[0]
+        return rough_models([self], thorough=thorough)[0]
 
     @cached_property
     def _roughly(self) -> dict[bool, Model]:
@@ -247,7 +247,8 @@ def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[M
     """
     shapes: dict[tuple[object, ...], list[Snapshot]] = {}
     for shot in shots:
-        shapes.setdefault((shot.turned, *shot.problem.samples), []).append(shot)
+        if thorough not in shot._roughly:
+            shapes.setdefault((shot.turned, *shot.problem.samples), []).append(shot)
     for alike in shapes.values():
         trials = [(tracks(shot.problem, shot.model), shot.model) for shot in alike]
         for shot, model in zip(alike, rough_frames(trials, thorough=thorough), strict=True):

@@ -82,9 +82,9 @@ def next_experiment(
     best = max(plan.score for plan in plans)
     decided = not closed and all(plan.decided for plan in plans)
     if decided:
-        reported = wider(_DECIDED)
+        proposal = wider(_DECIDED)
     elif best == 0.0:
-        reported = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
+        proposal = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
     else:
         good = [plan for plan in plans if plan.score >= _WORTH * best]
         if not problem.at_rest:
@@ -93,8 +93,8 @@ def next_experiment(
         least = min(plan.minutes for plan in good)
         # Half a minute is no reason to learn less.
         near = [plan for plan in good if plan.minutes <= least + _NEAR]
-        reported = _comparison(max(near, key=lambda plan: plan.apart), alternatives, model)
-    return reported | {'skipped': skipped} if skipped else reported
+        proposal = _comparison(max(near, key=lambda plan: plan.apart), alternatives, model)
+    return proposal | {'skipped': skipped} if skipped else proposal
 
 
 def confirming(
@@ -154,9 +154,9 @@ _NARROW = (
 
 def _comparison(plan: Plan, alternatives: Sequence[_Explanation], model: Model) -> dict[str, Any]:
     one, other = _apart(alternatives[0], alternatives[plan.other])
-    reported = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
+    names = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
-        f'The data at hand tell {reported} by {plan.before:.1f} standard deviations; this would add '
+        f'The data at hand tell {names} by {plan.before:.1f} standard deviations; this would add '
         f'{plan.after:.0f}.'
     )
     return _entry(plan, reason, model, [_side(one), _side(other)])

@@ -305,8 +305,8 @@ def robust_scale(
     freedom: coordinates that the residuals' own data determined; they took their share of the
     noise.
     """
-    reported = problem.given_weights
-    residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
+    given = problem.given_weights
+    residuals = [part * np.sqrt(own) for part, own in zip(residuals, given, strict=True)]
     size = max(problem.size, 1)
     kept = max(1.0 - freedom / size, 0.0)
     # Shifts and turns as sure as usual ones.
@@ -327,7 +327,7 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for part, own in zip(residuals, reported, strict=True):
+    for part, own in zip(residuals, given, strict=True):
         off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
         if part.shape[0] > 3:
             off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)

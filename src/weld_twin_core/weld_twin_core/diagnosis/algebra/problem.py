@@ -165,8 +165,8 @@ class Problem:
     @cached_property
     def roots(self) -> list[Array | None]:
         """Return what makes independent rows of each recording's poses; None where none is given."""
-        reported = (r.seen.noise for r in self.recordings)
-        return [None if noise is None else noise.root for noise in reported]
+        noises = (r.seen.noise for r in self.recordings)
+        return [None if noise is None else noise.root for noise in noises]
 
     def touching(self, model: Model) -> Problem:
         """Return the problem with its contacts as a model sees them; no contacts, no change."""
@@ -218,9 +218,9 @@ class Problem:
         Of contacts whose uncertainty is known, in shares of the surest; one for all others. Where
         recordings are differently sure, less for those that are not.
         """
-        reported = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
-        least = min((float(sigma.min()) for sigma in reported if sigma is not None), default=0.0)
-        pairs = zip(reported, self.samples, strict=True)
+        sigmas = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
+        least = min((float(sigma.min()) for sigma in sigmas if sigma is not None), default=0.0)
+        pairs = zip(sigmas, self.samples, strict=True)
         out = [np.ones(m) if sigma is None else (least / sigma) ** 2 for sigma, m in pairs]
         if not self.loose:
             return out

@@ -73,14 +73,14 @@ def answer(
     limits: what the next experiment may cost, and where it has to stay; None plans none.
     """
     forms = alternative, evidence.floor, result.work.beliefs, placing
-    reported, shares = causes(result, unseen, before.table, verdict, *forms)
+    claims, shares = causes(result, unseen, before.table, verdict, *forms)
     groups = of_form(len(placing.parts), placing.steady)
-    verdict, reported, statements = calibrated(verdict, reported, before, groups)
-    reported = with_intervals(reported, result, unseen, verdict, evidence.floor)
-    effects, verdict, reported = named_effects(result, unseen, verdict, reported, posterior)
+    verdict, claims, statements = calibrated(verdict, claims, before, groups)
+    claims = with_intervals(claims, result, unseen, verdict, evidence.floor)
+    effects, verdict, claims = named_effects(result, unseen, verdict, claims, posterior)
     return Diagnosis(
         gap=_gap(result, evidence.floor),
-        where=locate(result, evidence.structure, reported),
+        where=locate(result, evidence.structure, claims),
         status=verdict.status,
         effects=effects,
         indistinguishable=verdict.sets,
@@ -94,7 +94,7 @@ def answer(
         model=_model(result, effects),
         evidence=evidence,
         posterior=posterior,
-        **_parted(unseen, reported, shares, verdict),
+        **_parted(unseen, claims, shares, verdict),
         statements=statements,
         contacts=contact_spreads(result, unseen),
         **_compared(result, examined, verdict),
@@ -114,17 +114,17 @@ def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
 
 def _parted(
     unseen: Unseen,
-    reported: tuple[Cause, ...],
+    claims: tuple[Cause, ...],
     shares: Shares,
     verdict: Verdict,
 ) -> dict[str, Any]:
     """Return what the levels of an answer say; what each cause adds, where the model stands for it."""
     return {
-        'causes': reported,
+        'causes': claims,
         'shares': shares,
         'reasons': verdict.reasons,
         'families': verdict.families,
-        'contributions': contributions(unseen, reported),
+        'contributions': contributions(unseen, claims),
         'confidence': verdict.confidence,
         'sure': verdict.sure,
         'complete': verdict.complete,

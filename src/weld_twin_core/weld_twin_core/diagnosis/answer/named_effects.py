@@ -51,19 +51,19 @@ def named_effects(
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
     """Return the reported effects, those that move the tool most first, with verdict and causes."""
     model = result.final.model
-    reported = _named_sets(model.found, verdict, causes, dense=result.dense)
+    named = _named_sets(model.found, verdict, causes, dense=result.dense)
     squares = (unseen.targets[1:] ** 2).sum(axis=1)
-    reported.sort(key=lambda pair: -squares[pair[0]])
-    if not reported:
+    named.sort(key=lambda pair: -squares[pair[0]])
+    if not named:
         return (), replace(verdict, sets=()), tuple(replace(c, effect=None) for c in causes)
     share = max(result.effective(result.small) / result.small.residual.size, _LEAST_SHARE)
     fitted = result.problem, model, result.scale, result.precision
     errors = standard_errors(*fitted, share, posterior, verdict.sets)
-    effects = tuple(Found(model.found[member], errors[member]) for member, _ in reported)
-    at = {group: k for k, (_, group) in enumerate(reported)}
+    effects = tuple(Found(model.found[member], errors[member]) for member, _ in named)
+    at = {group: k for k, (_, group) in enumerate(named)}
     return (
         effects,
-        replace(verdict, sets=tuple(verdict.sets[group] for _, group in reported)),
+        replace(verdict, sets=tuple(verdict.sets[group] for _, group in named)),
         tuple(replace(c, effect=None if c.effect is None else at.get(c.effect)) for c in causes),
     )
 
@@ -192,7 +192,7 @@ HALF_DIGIT = 5e-4
 
 
 def with_intervals(
-    reported: Sequence[Cause], result: Search, unseen: Unseen, verdict: Verdict, floor: float
+    found_causes: Sequence[Cause], result: Search, unseen: Unseen, verdict: Verdict, floor: float
 ) -> tuple[Cause, ...]:
     """
     Return causes with the 90 % intervals of their shares, above a noise of RMS ``floor`` [m].
@@ -202,13 +202,13 @@ def with_intervals(
     """
     curved = len(result.candidate_sets) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.candidate_sets) or not unseen.parts:
-        return tuple(covering(cause) for cause in reported)
+        return tuple(covering(cause) for cause in found_causes)
     tries = _tries(result, unseen, floor)
     return tuple(
         covering(cause)
         if cause.rest
         else _with_interval(cause, tries[:, list(cause.members)].sum(axis=1))
-        for cause in reported
+        for cause in found_causes
     )
 
 

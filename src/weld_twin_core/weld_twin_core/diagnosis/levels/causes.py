@@ -61,9 +61,9 @@ def causes(
     floor: RMS of the noise alone [m].
     placing: what tells the places of an unknown gap; of any other nothing.
     """
-    reported = _claims_of_names(result, table, verdict)
+    named = _claims_of_names(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
-    claims, rest = _nameless(result, reported, verdict, curved, placing, beliefs)
+    claims, rest = _nameless(result, named, verdict, curved, placing, beliefs)
     squares = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     parts = _contributions(unseen)
     labels = unseen.trusted_labels()
@@ -126,9 +126,9 @@ def _as_placed(
         return whole, spread
     explained = max(float(whole[of_groups].sum()), float(parts.sum()))
     explained = min(explained, max(1.0 - float(whole[~of_groups].sum()), 0.0))
-    reported = parts * explained / max(float(parts.sum()), 1e-300)
-    error = np.hypot(spread, reported / max(placing.steady, 1.0))
-    return np.where(of_groups, reported, whole), np.where(of_groups, error, spread)
+    shares = parts * explained / max(float(parts.sum()), 1e-300)
+    error = np.hypot(spread, shares / max(placing.steady, 1.0))
+    return np.where(of_groups, shares, whole), np.where(of_groups, error, spread)
 
 
 def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
@@ -158,7 +158,7 @@ def _claims_of_names(result: Search, table: Sequence[Row], verdict: Verdict) -> 
 
 def _nameless(
     result: Search,
-    reported: list[Cause],
+    named: list[Cause],
     verdict: Verdict,
     curved: Curved | None,
     placing: FreeForm,
@@ -167,12 +167,12 @@ def _nameless(
     """Return all claims with those of curves that the model holds, and what is left beside."""
     if verdict.status != 'unknown':
         # What was found and does not count as named is left, and nothing else says where it sits.
-        return reported, _rest([], beliefs) if len(reported) < len(result.candidate_sets) else None
+        return named, _rest([], beliefs) if len(named) < len(result.candidate_sets) else None
     model = result.final.model.found
     places = _by_place(placing.parts)
     curves_at = _curves_by_place(places, curved) if places else {}
-    claims, remaining = list(reported), list[Part]()
-    taken = {at for claim in reported for at in claim.members}
+    claims, remaining = list(named), list[Part]()
+    taken = {at for claim in named for at in claim.members}
     if taken_out := result.lacking:
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
         stand_in = _stand_in(taken_out[0], beside, model)
@@ -276,14 +276,14 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[Cause]:
         if not (family.named and family.needed):
             continue
         whole = 1.0 + sum(part for _, part in family.like)
-        reported = [(site, share / whole) for site, share in family.needed]
-        reported += [(site, part / whole) for site, part in family.like]
+        sites = [(site, share / whole) for site, share in family.needed]
+        sites += [(site, part / whole) for site, part in family.like]
         effects = {Site.of(effect): effect for effect in reversed(model)}
-        place = marginal((effects[site].at, part) for site, part in reported)
-        dependence = marginal((effects[site].on, part) for site, part in reported)
+        place = marginal((effects[site].at, part) for site, part in sites)
+        dependence = marginal((effects[site].on, part) for site, part in sites)
         members = tuple(k for k, effect in enumerate(model) if effect.name == family.effect)
         group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
-        levels = place, dependence, dict(reported)
+        levels = place, dependence, dict(sites)
         out.append(_cause(members, *levels, share=family.share, effect=group))
     return out
 

@@ -141,8 +141,8 @@ def examine(
             posed = aligned(trial.recordings, trial.robot, trial.align, tuple(own))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
             result = look.mistakes
-        reported = {each.sentence for each in mistakes}
-        fresh = [each for each in result if each.sentence not in reported]
+        earlier = {each.sentence for each in mistakes}
+        fresh = [each for each in result if each.sentence not in earlier]
         mistakes += fresh
         if not fresh or any(each.mend is None for each in fresh):
             break
@@ -183,9 +183,9 @@ class _Look(NamedTuple):
         alone = len(self.posed[0].recordings) == 1
         dated = tuple(slip.effect for slip in self.dated) if alone else ()
         problem = replace(self.posed[0], dated=dated)
-        reported = tuple(each.sentence for each in mistakes)
+        sentences = tuple(each.sentence for each in mistakes)
         made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
-        return problem, replace(self.posed[1], mended=reported, mends=made)
+        return problem, replace(self.posed[1], mended=sentences, mends=made)
 
 
 def _looked(problem: Problem, model: Model) -> _Look:

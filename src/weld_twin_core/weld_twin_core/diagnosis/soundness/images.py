@@ -155,7 +155,7 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     frames = problem.whitened(parts, scale)
     span = span_of(frames)
     remaining = outside(remaining[None], span)[0]
-    reported: list[tuple[float, float, str]] = []
+    explanations: list[tuple[float, float, str]] = []
     for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
         each = [columns(r.images, r.seen.position) for r in problem.recordings]
         rows = [
@@ -168,8 +168,8 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
         column = outside(problem.whitened(rows, scale)[None], span)[0]
         size = float(column @ column)
         share = float(column @ remaining) / size
-        reported.append((share**2 * size / float(remaining @ remaining), share, kind))
-    explained, share, kind = max(reported, default=(0.0, 0.0, ''))
+        explanations.append((share**2 * size / float(remaining @ remaining), share, kind))
+    explained, share, kind = max(explanations, default=(0.0, 0.0, ''))
     if abs(share) > TARGET_SCALE and HALVED * explained > 1.0:
         yield _too_large(case, kind, share)
 

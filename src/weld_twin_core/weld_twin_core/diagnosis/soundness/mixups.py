@@ -184,7 +184,7 @@ def _framed(shot: Snapshot, model: Model, more: set[str], remaining: float) -> F
     )
 
 
-def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
+def _fixture(robot: Robot, bases: Sequence[Array], sentence: str) -> Finding:
     """Return the mistake that poses were measured in another frame of the workpiece than was given."""
     seen = [np.asarray(np.linalg.inv(base)) for base in bases]
     steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
@@ -197,7 +197,7 @@ def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
     return mistake(
         f'The poses{which} were measured in the frame of another fixture than was given: on the '
         f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
-        f'{reported}.',
+        f'{sentence}.',
         'wrong_fixture',
         ('base',),
         "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
@@ -211,13 +211,13 @@ def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
 
 def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
-    reported = _other_links(shot) if case.gap >= UNDONE else None
-    if reported is None:
+    finding = _other_links(shot) if case.gap >= UNDONE else None
+    if finding is None:
         return ()
     bundled = _best(shot, arm, robots(shot.robot))
     if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone) is None:
         return (_finding(bundled, shot, bundled.undone.remaining),)
-    return (reported,)
+    return (finding,)
 
 
 def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:

@@ -143,16 +143,16 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     named = remaining.explained * _share_of(likely, evidence)
     more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
     more += remaining.scattered
-    reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
+    likeliest = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
     if named <= more or evidence.nameless > LIKELIER:
-        return Verdict('unknown', reported, _why_unknown(remaining, sets, likely))
+        return Verdict('unknown', likeliest, _why_unknown(remaining, sets, likely))
     reasons = tuple(
         f'{", ".join(map(str, group))} move the tool alike on these data: their fits differ by less '
         'than the noise'
-        for group in reported
+        for group in likeliest
         if len(group) > 1
     )
-    return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
+    return Verdict('ambiguous' if reasons else 'identified', likeliest, reasons)
 
 
 def _mean_of_jumps(evidence: Evidence, candidate_set: CandidateSet) -> bool:
@@ -231,19 +231,19 @@ def _of_families(remaining: Left) -> Verdict:
     """Return the families that unseen data need, each with the joints that they need it on."""
     beliefs = remaining.beliefs
     families = []
-    for reported in remaining.evidence.families or ():
-        members = tuple(item for item in reported.members if item[1] > beliefs.member_least_m)
+    for family in remaining.evidence.families or ():
+        members = tuple(item for item in family.members if item[1] > beliefs.member_least_m)
         if members:
             # Joints at which it is the same error count together.
             needed = tuple(
                 (site, share)
-                for site, share in reported.needed
-                if share * len(reported.group(site)) >= beliefs.joint_worth
+                for site, share in family.needed
+                if share * len(family.group(site)) >= beliefs.joint_worth
             )
-            like = tuple(item for item in reported.like if item[1] >= beliefs.joint_worth)
-            named = reported.missed(beliefs.family_worth)
+            like = tuple(item for item in family.like if item[1] >= beliefs.joint_worth)
+            named = family.missed(beliefs.family_worth)
             families.append(
-                replace(reported, named=named, members=members, needed=needed, like=like)
+                replace(family, named=named, members=members, needed=needed, like=like)
             )
     families.sort(key=lambda family: -family.rms_m)
     sets = tuple(group for family in families if family.named for group in _sets_of(family))

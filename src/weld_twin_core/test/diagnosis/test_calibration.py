@@ -9,7 +9,14 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.calibration.calibrated import Stated, Statement, calibrated, stated
-from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_situation, of_whole
+from weld_twin_core.diagnosis.calibration.features import (
+    KINDS,
+    faint,
+    hardly_a_gap,
+    odds,
+    of_situation,
+    of_whole,
+)
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
 from weld_twin_core.diagnosis.result import Cause, Site, Structure
@@ -70,6 +77,23 @@ def test_the_whole_answer_has_the_least_of_its_names():
     assert beside['names'] == pytest.approx(np.log(0.9 * 0.6))
     assert beside['least name'] == pytest.approx(np.log(0.6 / 0.4))
     assert beside['told'] == 1
+
+
+@pytest.mark.parametrize(
+    ('size', 'others', 'doubtful'), [(-0.1, 1, 1.0), (-0.1, 0, 0.0), (0.1, 2, 0.0)]
+)
+def test_an_effect_below_the_noise_is_faint_only_beside_others(size, others, doubtful):
+    assert faint(size, others) == doubtful
+    names = [{'size': size, 'members': 4.0}] + others * [{'size': 1.0, 'members': 1.0}]
+    told = of_whole([0.9] * len(names), names)
+    assert (told['one faint beside others'], told['a wide set']) == (doubtful, 1.0)
+
+
+def test_a_gap_hardly_above_the_noise_is_none_unless_something_regular_is_left():
+    for squared, depth in ((1.01, 2.0), (1.1, 1.0), (2.0, 0.0), (50.0, 0.0)):
+        gap = np.log10(squared) / 2.0
+        assert hardly_a_gap(gap, -3.0) == pytest.approx(depth)
+        assert hardly_a_gap(gap, -1.0) == 0.0
 
 
 def test_log_odds_end_at_a_thousand_to_one():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
-from weld_twin_lab.belief.judged import kept, sets_hold
+from weld_twin_lab.belief.judged import complete, kept, sets_hold
 from weld_twin_lab.belief.mix import CROWDED, MOST, SEVERAL, drawn, lot_of
 from weld_twin_lab.belief.trial import diagnosed, recordings_of, tried
 from weld_twin_lab.belief.visible import shown
@@ -125,6 +125,32 @@ def row(*causes, model=(PLAY,), after=1e-5):
         'sealed': {'before': 1e-4, 'after': after},
         'seconds': 1.0,
     }
+
+
+@pytest.mark.parametrize(
+    ('at_work', 'told', 'nothing_missing'),
+    [
+        ([('station_step', None)], [('instrument_knock', None)], True),
+        ([('servo_lag', 'a'), ('servo_lag', 'b')], [('time_delay', None)], True),
+        ([('servo_lag', 'a')], [('time_delay', None)], False),
+        ([PLAY, ('station_step', None)], [('instrument_knock', None)], False),
+    ],
+)
+def test_a_cause_that_goes_by_another_name_in_the_library_is_not_missing(
+    at_work, told, nothing_missing
+):
+    equal_lags = at_work == [('servo_lag', 'a'), ('servo_lag', 'b')]
+    names = [{'effect': effect, 'joint': joint} for effect, joint in told]
+    row = {
+        'truth': {
+            **truth(*at_work),
+            'alike': [[('time_delay', None)]] if equal_lags else [],
+            'ratios': [9.0] * len(at_work),
+        },
+        'verdict': {'causes': [{'rest': False, 'name': names}]},
+        'statements': [{'kind': 'complete', 'features': {'gap': 1.0}}],
+    }
+    assert complete(row) == nothing_missing
 
 
 def test_an_innocent_place_is_accused_and_a_model_disowned():

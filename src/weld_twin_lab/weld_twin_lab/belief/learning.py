@@ -43,6 +43,11 @@ FEWEST_NAMED = 30
 """Examples in which a family is named alone from which on that is a feature."""
 DIGITS = 4
 """Significant digits of a weight."""
+LEAST = 0.05
+"""
+Nats that a feature adds at the most over all its range, up to which it is left out: nobody can see it
+in a probability, and each weight that is left is one more to read.
+"""
 
 
 class Table(NamedTuple):
@@ -234,7 +239,7 @@ def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, 
         'weights': {
             name: {'weight': _short(slope), 'low': _short(low), 'high': _short(high)}
             for name, slope, low, high in zip(names, slopes, scaled.low, scaled.high, strict=True)
-            if abs(slope) > 1e-4
+            if abs(slope) * (high - low) > LEAST
         },
     }
 

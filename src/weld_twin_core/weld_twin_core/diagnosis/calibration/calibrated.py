@@ -70,9 +70,9 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
     if evidence.families is not None:
         return Stated(table, (), None, situation, evidence.floor)
     sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
-    each = zip(table, sizes, evidence.wandered, strict=False)
+    each = list(zip(table, sizes, evidence.wandered, strict=False))
     on = evidence.structure.depends_on
-    every = [of_name(row, size, wandered, on) for row, size, wandered in each]
+    every = [of_name(row, size, wandered, len(each) - 1, on) for row, size, wandered in each]
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
         return Stated(table, (), None, situation, evidence.floor)

@@ -25,6 +25,10 @@ FAR = 1e3
 """Nothing beyond a thousand, or below a thousandth, says more."""
 MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
+REGULAR = -2.0
+"""Decimal logarithm of the share of what is left from which on it counts as regular."""
+WIDE = 3
+"""Members of a set of names up to which it still says what to do; a wider one is held to more."""
 ONLY = 'only '
 """Before a family that is named alone: some stand in for causes that no library has."""
 TOLD_AS = ('many', 'none', 'unknown')
@@ -59,6 +63,7 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
             'left': log(evidence.after / floor),
             'left unexplained': log(Left(evidence, beliefs).share),
             'structure': log(evidence.structure.gain),
+            'hardly a gap': hardly_a_gap(log(evidence.gap / floor), log(evidence.structure.gain)),
             'rows': log(evidence.rows),
             'joints moving': float((np.array(evidence.travel) > MOVES).mean()),
             'lacking': float(bool(evidence.lacking)),
@@ -70,12 +75,25 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
     )
 
 
-def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ()) -> Numbers:
+def hardly_a_gap(gap: float, structure: float) -> float:
+    """
+    Return by how much the squared gap exceeds the noise less than once, where nothing regular is left.
+
+    gap: over the noise. Both are decimal logarithms, and so is what is returned.
+    """
+    excess = log(10.0 ** (2.0 * gap) - 1.0)
+    return max(-excess, 0.0) if structure < REGULAR else 0.0
+
+
+def of_name(
+    row: Row, size: float, wandered: float, others: int = 0, left_at: Sequence[str] = ()
+) -> Numbers:
     """
     Return the features of the name of an effect found, from its row of the table of answers.
 
     size: how far the effect moves the tool, RMS in units of noise.
     wandered: how far its values move from stretch to stretch, over what noise makes them.
+    others: how many effects were found beside it.
     left_at: what the most of what is left depends on, in words.
     """
     on = row.leader.dependence
@@ -88,6 +106,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
             'wander': log(wandered),
             'wander over size': log(wandered) - log(size),
             'members': len(row.listed),
+            'faint beside others': faint(log(size), others),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
             'constant': float(on == 'constant'),
             'angle': float(on == 'angle'),
@@ -104,7 +123,7 @@ def of_level(row: Row, level: str) -> Numbers:
 
 def of_form(groups: int, steady: float) -> Numbers:
     """Return how many groups without a formula stand for what has no name, and how surely."""
-    return plain({'groups': groups, 'steady': min(steady, 10.0)})
+    return plain({'groups': groups, 'no group': float(groups == 0), 'steady': min(steady, 10.0)})
 
 
 def of_rest(cause: Cause, level: str) -> Numbers:
@@ -164,16 +183,45 @@ def of_whole(
         for key, reported in own.items()
         if key.startswith(ONLY) and reported
     }
+    least_size = min((own['size'] for own in names), default=0.0)
+    widest = max((own['members'] for own in names), default=0.0)
     return plain(
         {
             'names': float(np.log(max(float(np.prod(held)), 1.0 / FAR))),
             'least name': odds(min(held, default=0.5)),
             'told': len(names),
-            'least size': min((own['size'] for own in names), default=0.0),
-            'widest set': max((own['members'] for own in names), default=0.0),
+            'least size': least_size,
+            'widest set': widest,
+            **of_outline(len(names), least_size, widest),
             **alone,
         }
     )
+
+
+def of_outline(told: float, least_size: float, widest: float) -> Numbers:
+    """
+    Return whether a set is too wide to act on, and whether one of several effects is faint.
+
+    told: effects.
+    least_size: of the smallest of them, as a decimal logarithm in units of noise.
+    widest: members of the widest set of names.
+    """
+    return {
+        'a wide set': float(widest > WIDE),
+        'one faint beside others': faint(least_size, told - 1.0),
+    }
+
+
+def faint(size: float, others: float) -> float:
+    """
+    Return whether an effect moves the tool by less than the noise while others move it, too.
+
+    One that is alone at work is seen in all that the noise leaves; beside others a small one is
+    often what these leave where their form is not quite right.
+
+    size: decimal logarithm, in units of noise.
+    """
+    return float(others >= 1.0 and size < 0.0)
 
 
 def plain(numbers: Mapping[str, float]) -> Numbers:

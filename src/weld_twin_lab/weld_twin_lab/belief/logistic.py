@@ -33,6 +33,7 @@ def fitted(
     ridge: float,
     weight: Array,
     prior: Array | None = None,
+    near: Weights | None = None,
 ) -> Weights:
     """
     Return the weights of least penalised log loss.
@@ -44,6 +45,7 @@ def fitted(
     ridge: of half the squared distance from the prior, against log loss in nats.
     weight: of every example, shape (N,).
     prior: weights that the ridge pulls to, shape (P,); zeros when left out.
+    near: weights to begin with, where those of nearly the same examples are known.
     """
     prior = np.zeros(columns.shape[1]) if prior is None else prior
     # One more case of each outcome, with every sign at its middle: few cases are never certain.
@@ -63,7 +65,8 @@ def fitted(
     bounds = [(None, None)] + [
         (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
     ]
-    start = np.concatenate([[np.log(share / (1.0 - share))], prior])
+    near = near or Weights(float(np.log(share / (1.0 - share))), prior)
+    start = np.concatenate([[near.bias], near.slopes])
     solution = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
     return Weights(float(solution.x[0]), np.asarray(solution.x[1:]))
 

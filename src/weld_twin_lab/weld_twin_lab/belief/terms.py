@@ -79,7 +79,7 @@ TERMS: dict[str, dict[str, int]] = {
         'angle': 0,
         'wander': 0,
     },
-    'name of many': MANY,
+    'name of many': {**MANY, 'left': 0},
     'place of many': MANY,
     'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},

@@ -12,6 +12,7 @@ done is no property of a cell.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isnan
 
 import numpy as np
 
@@ -226,7 +227,7 @@ def faint(size: float, others: float) -> float:
 
 def plain(numbers: Mapping[str, float]) -> Numbers:
     """Return finite numbers, cut where nothing beyond says more."""
-    return {k: float(np.clip(np.nan_to_num(v, nan=0.0), -FAR, FAR)) for k, v in numbers.items()}
+    return {key: 0.0 if isnan(v) else float(min(max(v, -FAR), FAR)) for key, v in numbers.items()}
 
 
 def odds(probability: float) -> float:

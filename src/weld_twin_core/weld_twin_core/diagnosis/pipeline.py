@@ -29,7 +29,7 @@ from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
 from .predicting.alone import alone
-from .result import Diagnosis, Shrink
+from .result import Diagnosis, Shrink, Structure
 from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
@@ -37,7 +37,7 @@ from .soundness.richness import refuse_reused
 from .unseen.held_out_shrink import borne_out, held_out_shrink
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
-from .verdict.decision import LIKELIER, decide
+from .verdict.decision import LIKELIER, beyond_doubt, decide
 from .verdict.evidence import Row
 
 Progress = Callable[[str], None]
@@ -198,8 +198,7 @@ def _conclude(
     """Return the diagnosis of what was found."""
     holdout = examined.mended(holdout)
     result = borne_out(result, holdout, beliefs)
-    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
-    leftover = structure(unseen, result.final.model, result.baseline, beliefs)
+    unseen, leftover = _judged(result, beliefs)
     progress('looked for what is left')
     residuals = result.problem.residuals(result.final.model)
     # As many coordinates as rows leave nothing of a noise that is there all the same.
@@ -228,6 +227,21 @@ def _conclude(
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
+
+
+def _judged(result: Search, beliefs: Beliefs) -> tuple[Unseen, Structure]:
+    """
+    Return unseen parts of the data, and what generic columns find there.
+
+    Readings that stray by themselves are noise, and are left out, unless something regular is left
+    with them: a cause that shows at few places only looks like strays.
+    """
+    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    model, baseline = result.final.model, result.baseline
+    leftover, apart = structure(unseen, model, baseline, beliefs), unseen.apart_from_strays()
+    if apart is unseen or beyond_doubt(leftover, beliefs):
+        return unseen, leftover
+    return apart, structure(apart, model, baseline, beliefs)
 
 
 def _alone(result: Search, shrink: Shrink) -> Search:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ...recording import Recording
-from ..algebra.fit import strays
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -62,8 +62,8 @@ def gathered(
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
-        strays=_named(recordings, strays(result.scale.weights)),
-        but_for=unseen.rms_but_for_strays(),
+        strays=_named(recordings, unseen.strays) if unseen.apart else (),
+        with_strays=replace(unseen, apart=False).rms(unseen.whole),
         scattered=scattered(result, unseen, beliefs),
         stations=any(recording.joints.static for recording in recordings),
     )

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..beliefs import Beliefs
 from ..hypotheses.alternatives import CandidateSet
-from ..result import Family, Site
+from ..result import Family, Site, Structure
 from .evidence import Evidence, named_together
 
 LIKELIER = 0.5
@@ -58,6 +58,14 @@ class Verdict:
     complete: float = 0.0
 
 
+def beyond_doubt(structure: Structure, beliefs: Beliefs) -> bool:
+    """Return whether what generic columns find is there beyond doubt."""
+    gain, sure = structure.gain, structure.sure
+    usual = gain > beliefs.structure_gain and sure > beliefs.structure_sure
+    blatant = gain > beliefs.blatant_gain and sure > beliefs.blatant_sure
+    return (usual or blatant) and gain > structure.chance
+
+
 @dataclass(frozen=True, eq=False)
 class Left:
     """Evidence, and the numbers from which on what it leaves is more than noise."""
@@ -68,10 +76,7 @@ class Left:
     @property
     def structured(self) -> bool:
         """Return whether generic columns find something beyond doubt."""
-        gain, sure = self.evidence.structure.gain, self.evidence.structure.sure
-        usual = gain > self.beliefs.structure_gain and sure > self.beliefs.structure_sure
-        blatant = gain > self.beliefs.blatant_gain and sure > self.beliefs.blatant_sure
-        return (usual or blatant) and gain > self.evidence.structure.chance
+        return beyond_doubt(self.evidence.structure, self.beliefs)
 
     @property
     def high(self) -> bool:
@@ -199,9 +204,9 @@ def _of_nothing(remaining: Left) -> Verdict:
     evidence, beliefs = remaining.evidence, remaining.beliefs
     if evidence.refused or evidence.lacking:
         return Verdict('unknown', (), (_absurd(evidence),))
-    but_for = replace(remaining, evidence=replace(evidence, after=evidence.but_for))
-    noise = evidence.strays and not remaining.structured and not but_for.rises(beliefs.above)
-    if noise and remaining.rises(beliefs.above):
+    with_strays = replace(remaining, evidence=replace(evidence, after=evidence.with_strays))
+    noise = not remaining.structured and not remaining.rises(beliefs.above)
+    if evidence.strays and noise and with_strays.rises(beliefs.above):
         first, others = evidence.strays[:LISTED], len(evidence.strays) - LISTED
         names = ', '.join(first) + (f' and {others} others' if others > 0 else '')
         reason = (

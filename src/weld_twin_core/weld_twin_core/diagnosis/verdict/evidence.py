@@ -73,9 +73,9 @@ class Evidence:
     stations: bool = False
     """Whether the arm stood still where it was measured, in one of the recordings at least."""
     strays: tuple[str, ...] = ()
-    """Readings that stand out by themselves, in words."""
-    but_for: float = 0.0
-    """What is left on unseen data without these readings, RMS [m]."""
+    """Readings that stand out by themselves and are left out of what is judged, in words."""
+    with_strays: float = 0.0
+    """What is left on unseen data with these readings, RMS [m]."""
     scattered: tuple[Scatter, ...] = ()
     """Noise that comes from joints beyond doubt, largest first."""
 

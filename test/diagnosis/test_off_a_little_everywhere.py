@@ -46,7 +46,7 @@ def lost_motion(diagnosis, joint):
 
 def test_play_is_named_where_a_field_of_small_errors_is_left_beside_it():
     robot = load('kuka_kr16_2')
-    seen = recorded(robot, flaws(robot, 3.4e-4, 'joint_a4', 3), seed=3)
+    seen = recorded(robot, flaws(robot, 6e-4, 'joint_a4', 3), seed=3)
     found = diagnose([seen], robot, experiment=False)
     assert found.status in ('identified', 'ambiguous')
     assert lost_motion(found, 'joint_a4') == {'backlash'}

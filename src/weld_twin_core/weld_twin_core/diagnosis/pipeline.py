@@ -198,7 +198,7 @@ def _conclude(
     """Return the diagnosis of what was found."""
     holdout = examined.mended(holdout)
     result = borne_out(result, holdout, beliefs)
-    unseen, leftover = _judged(result, beliefs)
+    unseen, leftover = _without_strays(result, beliefs)
     progress('looked for what is left')
     residuals = result.problem.residuals(result.final.model)
     # As many coordinates as rows leave nothing of a noise that is there all the same.
@@ -229,7 +229,7 @@ def _conclude(
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
 
 
-def _judged(result: Search, beliefs: Beliefs) -> tuple[Unseen, Structure]:
+def _without_strays(result: Search, beliefs: Beliefs) -> tuple[Unseen, Structure]:
     """
     Return unseen parts of the data, and what generic columns find there.
 

@@ -78,9 +78,10 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
 
 def hardly_a_gap(gap: float, structure: float) -> float:
     """
-    Return by how much the squared gap exceeds the noise less than once, where nothing regular is left.
+    Return how far the excess of the squared gap stays below the squared noise.
 
-    gap: over the noise. Both are decimal logarithms, and so is what is returned.
+    Zero where it does not, and where something regular is left. gap: over the noise. All are decimal
+    logarithms.
     """
     excess = log(10.0 ** (2.0 * gap) - 1.0)
     return max(-excess, 0.0) if structure < REGULAR else 0.0

@@ -108,9 +108,12 @@ def choose_model(
     nothing = result.dense and verdict.status == 'none'
     if verdict.status != 'unknown' and not nothing:
         return result, unseen, shrink, verdict
-    if alternative is not None and _worth(unseen, alternative, verdict, beliefs):
-        result, unseen = alternative.found, alternative.unseen
-        shrink = held_out_shrink(result, unseen, holdout, beliefs)
+    apart = unseen.apart
+    if alternative is not None:
+        there = alternative.unseen.apart_from_strays() if apart else alternative.unseen
+        if _worth(unseen, there, verdict, beliefs):
+            result, unseen = alternative.found, there
+            shrink = held_out_shrink(result, unseen, holdout, beliefs)
     least = 1.0 if verdict.sets else beliefs.better
     if shrink.rms_after_m <= least * shrink.rms_before_m and not nothing:
         return result, unseen, shrink, verdict
@@ -120,13 +123,17 @@ def choose_model(
     final = replace(result.baseline, residual=bare)
     result = replace(result, final=final, precision=np.zeros(0), candidate_sets=(), dense=False)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    unseen = unseen.apart_from_strays() if apart else unseen
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     return result, unseen, shrink, replace(verdict, sets=())
 
 
-def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
-    """Return whether the model has curves: for names that do not stand, or clearly beside."""
-    there = alternative.unseen
+def _worth(named: Unseen, there: Unseen, verdict: Verdict, beliefs: Beliefs) -> bool:
+    """
+    Return whether the model has curves: for names that do not stand, or clearly beside.
+
+    there: with the curves.
+    """
     before, after = named.squares(named.whole), there.squares(there.whole)
     if not verdict.sets:
         return float(after.mean()) <= beliefs.curve_room**2 * float(before.mean())

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_msgs_py.files import markdown
 
 from ..blind.ambiguous import Site
@@ -19,7 +20,7 @@ from ..blind.statistics import Estimate, bootstrap, calibration_error, share
 from .levels_of_truth import Levels, alike_by_structure, levels_of
 from .mix import MOST as CAUSES
 from .rows import rounded
-from .whole import WIDEST, whole
+from .whole import whole
 
 MOST = 2 * CAUSES
 """Effects of a model that are kept; more are many small errors."""

@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
 
 from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
 from .there import HALF, LARGE
 from .there import right as right_everywhere
-from .whole import FEW, WIDEST, whole
+from .whole import FEW, whole
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""

@@ -240,7 +240,7 @@ class Scaled(NamedTuple):
 
 
 def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, Any]:
-    scaled, fit = _fitted(table, signs, np.ones(len(table.right), bool))
+    scaled, fit = _fitted(table, signs)
     slopes = fit.slopes / scaled.spread
     return {
         'examples': len(table.right),
@@ -261,7 +261,7 @@ def _short(value: float) -> float:
 def _unseen(table: Table, signs: Array) -> Array:
     """Return the probability of each example by weights fitted on the other folds."""
     odds = np.zeros(table.folds.shape)
-    near = _fitted(table, signs, np.ones(len(table.right), bool))[1]
+    near = _fitted(table, signs)[1]
     for partition, fold in np.ndindex(PARTITIONS, FOLDS):
         here = table.folds[partition] == fold
         scaled, fit = _fitted(table, signs, ~here, near)
@@ -270,9 +270,12 @@ def _unseen(table: Table, signs: Array) -> Array:
 
 
 def _fitted(
-    table: Table, signs: Array, which: NDArray[np.bool_], near: Weights | None = None
+    table: Table,
+    signs: Array,
+    which: NDArray[np.bool_] | slice = slice(None),
+    near: Weights | None = None,
 ) -> tuple[Scaled, Weights]:
-    """Return the scaling and the weights of some examples."""
+    """Return the scaling and the weights of some examples, or of all."""
     scaled = Scaled.of(table.values[which])
     columns = scaled(table.values[which])
     fit = fitted(columns, table.right[which], signs, RIDGE, table.weight[which], near=near)

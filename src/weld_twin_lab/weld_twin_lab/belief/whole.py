@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.effects.registry import REGISTRY
 
@@ -17,8 +18,6 @@ VISIBLE = 25.0
 """Rise of chi-square without a cause from which on it shows: five standard deviations."""
 FEW = frozenset({'double', 'triple'})
 """Kinds of cases with two or three causes."""
-WIDEST = 3
-"""Members of a set that still counts as a name."""
 
 
 class Whole(NamedTuple):

@@ -28,7 +28,7 @@ MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
 REGULAR = -2.0
 """Decimal logarithm of the share of what is left from which on it counts as regular."""
-WIDE = 3
+WIDEST = 3
 """Members of a set of names up to which it still says what to do; a wider one is held to more."""
 ONLY = 'only '
 """Before a family that is named alone: some stand in for causes that no library has."""
@@ -209,7 +209,7 @@ def of_outline(told: float, least_size: float, widest: float) -> Numbers:
     widest: members of the widest set of names.
     """
     return {
-        'a wide set': float(widest > WIDE),
+        'a wide set': float(widest > WIDEST),
         'one faint beside others': faint(least_size, told - 1.0),
     }
 

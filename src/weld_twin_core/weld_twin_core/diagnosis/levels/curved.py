@@ -108,9 +108,8 @@ def choose_model(
     nothing = result.dense and verdict.status == 'none'
     if verdict.status != 'unknown' and not nothing:
         return result, unseen, shrink, verdict
-    apart = unseen.apart
     if alternative is not None:
-        there = alternative.unseen.apart_from_strays() if apart else alternative.unseen
+        there = alternative.unseen.judged_as(unseen)
         if _worth(unseen, there, verdict, beliefs):
             result, unseen = alternative.found, there
             shrink = held_out_shrink(result, unseen, holdout, beliefs)
@@ -122,8 +121,8 @@ def choose_model(
     bare = result.problem.whitened(result.problem.residuals(result.baseline.model), result.scale)
     final = replace(result.baseline, residual=bare)
     result = replace(result, final=final, precision=np.zeros(0), candidate_sets=(), dense=False)
-    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
-    unseen = unseen.apart_from_strays() if apart else unseen
+    alone = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    unseen = alone.judged_as(unseen)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     return result, unseen, shrink, replace(verdict, sets=())
 

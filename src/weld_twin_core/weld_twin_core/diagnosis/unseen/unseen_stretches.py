@@ -392,6 +392,10 @@ class Unseen:
         """Return the same, judged on readings that do not stray by themselves."""
         return replace(self, apart=True) if any(part.any() for part in self.strays) else self
 
+    def judged_as(self, other: Unseen) -> Unseen:
+        """Return the same, apart from strays where another is."""
+        return self.apart_from_strays() if other.apart else self
+
     def turn_rms(self, residual: Array) -> float | None:
         """Return the RMS orientation error over trusted samples [rad], None without any."""
         rows = self.problem.measured_rows(residual, self.scale)

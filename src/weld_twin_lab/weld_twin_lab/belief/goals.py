@@ -28,13 +28,14 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
     rows: as `judged.kept` gives them; none of them was learned from.
     """
     single = _of('single')
-    family = [float(r['family']) for r in rows if single(r) and r['status'] != 'none']
+    named = [r for r in rows if single(r) and r['status'] != 'none']
     seconds = [float(r['seconds']) for r in rows]
     return [
         *measured(CAUSES, rows),
         # The mean belief in the true family, as fault isolation benchmarks have it.
-        Measure(
-            'fia', 'mean belief in the true family, one cause', bootstrap(family, np.mean), 0.92
+        *(
+            Measure(key, title, bootstrap([float(r[of]) for r in named if of in r], np.mean), goal)
+            for key, title, of, goal in FAMILY
         ),
         Measure('seconds', 'processor seconds of a diagnosis, median', bootstrap(seconds)),
         *measured(FOREIGN, rows),
@@ -80,6 +81,15 @@ CAUSES = (
         lambda row: row['right'] and row['sure'],
         0.70,
     ),
+    Question(
+        'single_cause_sure',
+        'the same: its cause named, right and sure',
+        _causes(1, SEEN),
+        lambda row: any(
+            kind == 'name' and right and sure for kind, _, right, _, sure in row['examples']
+        ),
+        0.80,
+    ),
     Question('single_right', 'the same: right', _causes(1, SEEN), itemgetter('right')),
     Question(
         'oracle_sure',
@@ -112,6 +122,11 @@ CAUSES = (
     ),
 )
 """What is asked of causes that the library has."""
+FAMILY = (
+    ('fia', 'mean belief in the true family, one cause; a set counts whole', 'family', 0.92),
+    ('fia_shared', 'the same, a set shared among its members', 'family_shared', 0.85),
+)
+"""What is believed of the family of a single cause: key, title, what of a case, goal."""
 FOREIGN = (
     Question(
         'honest',

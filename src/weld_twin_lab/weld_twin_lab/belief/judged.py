@@ -79,6 +79,7 @@ def kept(row: Mapping[str, Any]) -> dict[str, Any]:
             causes, 'dependence', frozenset().union(*(own.dependences for own in words))
         ),
         'family': _family(row),
+        'family_shared': _family(row, shared=True),
         'seconds': row['seconds'],
         'examples': [list(one) for one in _examples(row, right)],
     }
@@ -111,18 +112,21 @@ def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str
     return first is not None and first[level][0][word] in words
 
 
-def _family(row: Mapping[str, Any]) -> float:
-    """Return the most that any cause believes of the family of the first cause at work."""
+def _family(row: Mapping[str, Any], *, shared: bool = False) -> float:
+    """
+    Return the most that any cause believes of the family of the first cause at work.
+
+    shared: whether of a set only the members of that family count, and not the set as one name.
+    """
     if not row['truth']['sites']:
         return 0.0
     (family, _), *_ = row['truth']['sites']
-    return max(
-        (
-            sum(n['probability'] for n in cause['name'] if n['effect'] == family)
-            for cause in row['verdict']['causes']
-        ),
-        default=0.0,
-    )
+    beliefs = [0.0]
+    for cause in row['verdict']['causes']:
+        members = [n['probability'] for n in cause['name'] if n['effect'] == family]
+        if members:
+            beliefs.append(sum(members) if shared else cause['probability'])
+    return max(beliefs)
 
 
 def _at_work(truth: Mapping[str, Any]) -> set[tuple[str, str | None]]:

@@ -12,7 +12,7 @@ from weld_twin_msgs_py.files import markdown
 
 from .statistics import Estimate, share
 
-NUMBERS = frozenset({'ece', 'seconds', 'fia'})
+NUMBERS = frozenset({'ece', 'seconds', 'fia', 'fia_shared'})
 """Measures that are numbers; the others are shares of cases."""
 HEADS = ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached')
 REACHED = {None: '', True: 'yes', False: 'no'}

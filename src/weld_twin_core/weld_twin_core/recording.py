@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -289,6 +289,29 @@ class JointSignal(Signal):
     _columns: ClassVar[int | None] = None
 
 
+class Counted(NamedTuple):
+    """How joint positions were made of what the controller shows: ``matrix @ shown + offset``."""
+
+    matrix: Array
+    """Shape (n, n)."""
+    offset: Array
+    """Shape (n,) [rad or m]."""
+
+    def as_mapping(self) -> dict[str, list[Any]]:
+        """Return it as plain values, as files have it."""
+        return {name: value.tolist() for name, value in self._asdict().items()}
+
+    @classmethod
+    def from_mapping(cls, entry: Mapping[str, Any], n: int) -> Counted:
+        """
+        Return that of plain values; n: joints of the robot.
+
+        Raises DataError: they are of another number of joints, or no numbers.
+        """
+        shapes = {'matrix': (n, n), 'offset': (n,)}
+        return cls(*(readonly(entry[key], shape, key) for key, shape in shapes.items()))
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """
@@ -339,6 +362,8 @@ class Recording:
     """The effort is what holds the load, as ROS means it; else it is the load itself."""
     images: Sightings | None = None
     """What cameras saw, of which the measurements were made; see `bundle`."""
+    counted: Counted | None = None
+    """How the controller counts the joints, where it is known to count otherwise than the robot."""
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:

@@ -634,6 +634,7 @@ class Diagnosis:
             'known': [effect.to_mapping() for effect in self.model.known],
             'found': [effect.to_mapping() for effect in self.model.found],
             'alone': None if self.model.alone is None else self.model.alone.as_dict(),
+            'counted': None if self.model.counted is None else self.model.counted.as_mapping(),
         }
 
     def _where(self) -> dict[str, Any]:

@@ -132,9 +132,10 @@ def test_times_of_day_and_dates_are_stamps(tmp_path, names, text):
 def test_signs_offsets_and_a_coupled_joint_are_undone(tmp_path):
     shown = np.degrees(Q) * [1, -1, 1, 1, -1, 1] - [0, 90, 0, 0, 0, 180] * np.array([1, -1] * 3)
     shown[:, 2] -= -(shown[:, 1])
-    head = [*numbered('J', joined=''), 'x [mm]', 'y [mm]', 'z [mm]']
+    head = [*numbered('J', joined=''), 'x [mm]', 'y [mm]', 'z [mm]', *numbered('tau_', joined='')]
+    efforts = np.random.default_rng(9).normal(size=shown.shape).round(6)
     lines = [
-        ','.join(f'{v:.6f}' for v in [*s, *p]) for s, p in zip(shown, POINT * 1e3, strict=True)
+        ','.join(f'{v:.6f}' for v in row) for row in np.column_stack([shown, POINT * 1e3, efforts])
     ]
     path = tmp_path / 'table.csv'
     path.write_text('\n'.join([','.join(head), *lines]) + '\n')
@@ -151,6 +152,13 @@ def test_signs_offsets_and_a_coupled_joint_are_undone(tmp_path):
     recording, said = read_table(path, UR5, options)
     np.testing.assert_allclose(recording.joints.q, Q, atol=1e-6)
     assert 'joints are coupled by 3+2' in said
+    matrix, offset = recording.counted
+    np.testing.assert_allclose(np.radians(shown) @ matrix.T + offset, Q, atol=1e-6)
+    # Efforts do the same work on the joints as the model counts them.
+    work = (efforts[:-1] * np.diff(np.radians(shown), axis=0)).sum(axis=1)
+    same = (recording.effort.value[:-1] * np.diff(Q, axis=0)).sum(axis=1)
+    np.testing.assert_allclose(same, work, atol=1e-6)
+    assert read_table(path, UR5).recording.counted is None
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.recording import Counted, JointMotion, Recording
 
 from ..assembly import Intake, Role, Samples, assembled
 from ..assembly.foreign_types import FedBack, plain_messages, plain_poses, split_topic
@@ -177,6 +177,8 @@ def read_recording(
         one_clock=one_clock,
         notes=_notes(names, streams, intake, bool(points)),
     )
+    if 'counted' in made:
+        whole = replace(whole, counted=Counted.from_mapping(made['counted'], robot.n))
     if touched:
         return touching(whole, touched, made)
     if seen:

@@ -104,6 +104,8 @@ def write_recording(
         made['artefact'] = recording.contacts.artefact.as_mapping()
     if recording.images is not None:
         made['seen'] = recording.images.as_mapping()
+    if recording.counted is not None:
+        made['counted'] = recording.counted.as_mapping()
     entries = _Entries(recording)
     parts = [*entries.inputs(robot)]
     if actual is not None:

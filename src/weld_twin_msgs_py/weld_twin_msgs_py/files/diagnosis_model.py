@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.dated import of_the_robot, seen_from
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.recording import Recording
+from weld_twin_core.recording import Counted, Recording
 from weld_twin_core.twin.twin import Twin
 
 from .yaml_file import whole
@@ -83,6 +84,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
             effects_from_list(_at_rest(model, key), robot) for key in ('known', 'found')
         )
         alone = _alone(model.get('alone'), robot)
+        counted = counted_of(model, robot)
         named = _named(content.get('verdict'))
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
@@ -92,7 +94,23 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
     with_tool = robot.with_frames(tool=tool)
     mended = tuple(str(item.get('sentence')) for item in applied)
-    return Model(with_tool, bases, known, result, mended, mends=mends, alone=alone, named=named)
+    return Model(
+        with_tool,
+        bases,
+        known,
+        result,
+        mended,
+        mends=mends,
+        alone=alone,
+        named=named,
+        counted=counted,
+    )
+
+
+def counted_of(model: Mapping[str, Any], robot: Robot) -> Counted | None:
+    """Return how the controller counts the joints of a model; None where as the robot, or unknown."""
+    entry = model.get('counted')
+    return None if entry is None else Counted.from_mapping(entry, robot.n)
 
 
 def _named(verdict: Any) -> tuple[tuple[str, str | None], ...] | None:

@@ -21,7 +21,7 @@ from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Rec
 from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
 from .header import Columns, find_columns
-from .joint_readings import Units, joint_angles, joint_units
+from .joint_readings import Units, counted, joint_angles, joint_units
 from .rotations import AGREES, disagreement, find_convention, rotations
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
 from .words import OWN, TableOptions, tokens
@@ -147,6 +147,7 @@ class _Reading:
             effort=self._effort(t),
             epoch_ns=epoch,
             notes=tuple(said),
+            counted=counted(robot, self.options),
         )
         return Table(recording, tuple(said)), units
 
@@ -205,7 +206,10 @@ class _Reading:
         self.said.append(
             f'efforts are {", ".join(names)} in {unit}; --use-effort has springs take them'
         )
-        return JointSignal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
+        values = values * [_TORQUES[unit or 'N m'] for unit in units]
+        # A joint that is counted otherwise does the same work.
+        other = counted(self.robot, self.options)
+        return JointSignal(t, values if other is None else values @ np.linalg.inv(other.matrix))
 
     def _relative_misfit(self, q: Array) -> float:
         """Return how far joints and positions are from belonging together, as a share of the way."""

@@ -21,7 +21,7 @@ from ..files.whole_files import write_text
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import CONTACTS, joint_columns, unit_of
-from .joint_readings import station_joints
+from .joint_readings import counted, station_joints
 from .unit_guess import METRES, factor
 from .words import TableOptions, shortened
 
@@ -123,6 +123,7 @@ def read_contacts(
         epoch_ns=own_epoch(cells.path),
         notes=tuple(said),
         contacts=contacts,
+        counted=counted(robot, options),
     )
     return Table(recording, tuple(said))
 

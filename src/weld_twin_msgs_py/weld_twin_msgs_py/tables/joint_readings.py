@@ -13,6 +13,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Counted
 
 from .cells import Cells
 from .header import unit_of
@@ -216,6 +217,14 @@ def as_modelled(q: Array, robot: Robot, options: TableOptions, said: list[str]) 
             f'added to the joints are {_listed(options.joint_offsets)} deg (mm for a slide)'
         )
     return q
+
+
+def counted(robot: Robot, options: TableOptions) -> Counted | None:
+    """Return how the controller counts the joints; None where it does as the robot."""
+    zero, *ones = as_modelled(np.eye(robot.n + 1, robot.n, -1), robot, options, []) + 0.0
+    matrix = np.column_stack(ones) - zero[:, None]
+    same = np.array_equal(matrix, np.eye(robot.n)) and not zero.any()
+    return None if same else Counted(matrix, zero)
 
 
 def _listed(values: tuple[float, ...]) -> str:

@@ -18,7 +18,7 @@ from weld_twin_core.recording import JointMotion, Recording
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import joint_columns, time_columns, unit_of
-from .joint_readings import station_joints
+from .joint_readings import counted, station_joints
 from .unit_guess import stamps
 from .words import TableOptions, shortened
 
@@ -77,6 +77,7 @@ def read_pixels(
         JointMotion(t, q, static=True),
         epoch_ns=own_epoch(cells.path),
         notes=tuple(said),
+        counted=counted(robot, options),
     )
     try:
         recording = seen_by(recording, seen)

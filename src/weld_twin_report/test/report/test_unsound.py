@@ -142,6 +142,34 @@ def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_ha
     assert needed not in (found / 'joint_offsets.csv').read_text() + str(content(found))
 
 
+JOINT_MOVE = 'def p():\n  movej([0.1, -1.3, 1.5, -1.8, -1.5, 0.0])\nend\n'
+
+
+def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remembered(
+    tmp_path, capsys
+):
+    recording = measured(1)
+    points, robot = recording.measured, load('ur5')
+    q = recording.joints.at(points.t)[0] * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    rows = np.column_stack([points.t, q, points.position])
+    head = ','.join(['time [s]', *(f'{name} [rad]' for name in robot.joint_names), 'x', 'y', 'z'])
+    np.savetxt(tmp_path / 'shown.csv', rows, delimiter=',', header=head, comments='')
+    words = ('import', tmp_path / 'shown.csv', '--robot', 'ur5', '--joint-signs', '1,1,-1,1,1,1')
+    assert run(*words, '--length-unit', 'm', '--out', tmp_path / 'bag') == 0
+    out = tmp_path / 'd'
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', *OTHERS, '--out', out) == 0
+    (action,) = content(out)['verdict']['actions']
+    assert 'elbow_joint stands at X + 0.1' in action
+    for told in (action, (out / 'joint_offsets.csv').read_text()):
+        assert 'as it was recorded needs the opposite sign' in told
+    program = tmp_path / 'p.script'
+    program.write_text(JOINT_MOVE)
+    words = ('correct', program, '--robot', 'ur5', '--model', out / 'diagnosis.json')
+    capsys.readouterr()
+    assert run(*words, '--out', tmp_path / 'better') == 2
+    assert 'the controller counts elbow_joint otherwise' in capsys.readouterr().err
+
+
 def test_a_sound_recording_says_that_nothing_is_wrong(found):
     assert content(found)['unsound'] == []
 

@@ -20,7 +20,7 @@ from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...pose_noise import Common
-from ...recording import Recording
+from ...recording import Counted, Recording
 from ...twin.features import Features, Remembered
 from ...twin.twin import Twin
 from .independent_rows import by_sample
@@ -510,6 +510,8 @@ class Model:
     common: tuple[Array, ...] = ()
     """Errors that all samples of an instrument share, one array for every recording, empty where
     it has none; nothing before they are fitted."""
+    counted: Counted | None = None
+    """How the controller counts the joints, where a recording says that it does so otherwise."""
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""
@@ -551,8 +553,11 @@ class Model:
 
     @property
     def turned(self) -> tuple[str, ...]:
-        """Return the joints whose readings were recorded with the other sign."""
-        negative = np.flatnonzero(np.diag(self.reading_map()[0]) < 0.0)
+        """Return the joints whose readings the controller shows with the other sign."""
+        matrix, _ = self.reading_map()
+        if self.counted is not None:
+            matrix = matrix @ self.counted.matrix
+        negative = np.flatnonzero(np.diag(matrix) < 0.0)
         return tuple(self.robot.joint_names[k] for k in negative.tolist())
 
     def without(self, k: int) -> Model:

@@ -69,7 +69,8 @@ def aligned(
     touched = [(k, part) for k, r in pairs if r.contacts is not None for part in _by_place(r)]
     parts = tuple(k for k, _ in (*tracked, *touched)) if touched else ()
     model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
-    model = replace(model, given=parts)
+    counted = next((r.counted for r in recordings if r.counted is not None), None)
+    model = replace(model, given=parts, counted=counted)
     filled = [_filled(r, model, k) for k, (_, r) in enumerate(touched, len(tracked))]
     anchor = Anchor(model.bases, model.robot.T_flange_tool)
     every = (*(r for _, r in tracked), *filled)

@@ -118,8 +118,11 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     setup = 0 if given.setup is None else given.setup - 1
     model = correcting.program_model(robot, given.model, given.temperature, setup)
     content = diagnosis_of(given.model)
+    readings = other_readings(content) or correcting.counted_otherwise(
+        content, context, program.language
+    )
     made = correcting.corrected_program(
-        program, context, model, caps, given.read_start(robot), other_readings(content)
+        program, context, model, caps, given.read_start(robot), readings
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content)

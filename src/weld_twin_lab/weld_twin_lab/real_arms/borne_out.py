@@ -89,21 +89,25 @@ class Borne:
 
 
 def borne_out(
-    row: ArmRow, reported: Sequence[Effect], claims: Sequence[Sequence[str]]
+    row: ArmRow,
+    reported: Sequence[Effect],
+    claims: Sequence[Sequence[str]],
+    told: Set[str],
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
     Return what unseen data say of every kind, and of every claim.
 
     reported: what a diagnosis reports: shapes that are not straight are taken from it.
-    claims: kinds that are reported, several where they are reported as alike: those are taken out
+    claims: kinds that are named, several where they are named as alike: those are taken out
     together.
+    told: kinds that are told as likelier than not; each claim is held against these.
 
     Returns
     -------
     kinds : dict of str to Borne
         Each against all others.
     claims : list of (Borne, Borne)
-        Each against all other kinds there are, and against all others that are reported.
+        Each against all other kinds there are, and against all others that are told.
 
     """
     fitted, other = thinned(row.fitted), None if row.other is None else thinned(row.other)
@@ -125,10 +129,12 @@ def borne_out(
         return Borne(float(np.median(grows)), float(grows.min()), grows.size)
 
     every_kind = set(kinds)
-    named = {kind for claim in claims for kind in claim} & every_kind
     return (
         {name: borne(every_kind, [name]) for name in kinds},
-        [(borne(every_kind, claim), borne(named, claim)) for claim in claims],
+        [
+            (borne(every_kind, claim), borne((told | set(claim)) & every_kind, claim))
+            for claim in claims
+        ],
     )
 
 

@@ -51,15 +51,18 @@ def judged(data: str, name: str) -> dict[str, Any]:
     if diagnosis is None:
         return out
     out |= _said(diagnosis)
-    claims = reported_claims(out)
+    claims, named = reported_claims(out), reported_claims(out, least=0.0)
     if diagnosis.status != 'unsound':
         known = [each.effect for each in diagnosis.effects]
-        kinds, borne = borne_out(one, known, [claim['kinds'] for claim in claims])
+        sets = [claim['kinds'] for claim in named]
+        kinds, borne = borne_out(one, known, sets, _kinds_of(claims))
         out['kinds'] = {kind: _plain(each) for kind, each in kinds.items()}
-        for claim, (whole, beside) in zip(claims, borne, strict=True):
+        for claim, (whole, beside) in zip(named, borne, strict=True):
             claim |= {'against_all': _plain(whole), 'against_told': _plain(beside)}
+        by_kinds = {tuple(claim['kinds']): claim for claim in named}
+        claims = [by_kinds[tuple(claim['kinds'])] | claim for claim in claims]
     out['claims'] = claims
-    out['examples'] = _examples(diagnosis, out['causes'], claims)
+    out['examples'] = _examples(diagnosis, out['causes'], named)
     out['unseen_m'] = _unseen(one, diagnosis)
     pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
@@ -71,14 +74,21 @@ def judged(data: str, name: str) -> dict[str, Any]:
 def _examples(
     diagnosis: Diagnosis, causes: Sequence[Mapping[str, Any]], claims: Sequence[Mapping[str, Any]]
 ) -> list[list[Any]]:
-    """Return every statement that a kind of many small errors is there, for belief to be learned."""
+    """
+    Return every statement that a kind of many small errors is there, for belief to be learned.
+
+    Of those believed too little to be reported, too: learned from the others alone, belief would
+    only ever fall.
+
+    claims: of all that has a name, however probable.
+    """
     out = []
     for said in map(vars, diagnosis.statements):
         if said['kind'] == 'name of many':
             kinds = {kind for kind, _, _ in causes[said['cause']]['names']}
-            own = [claim for claim in claims if kinds.issuperset(claim['kinds'])]
+            own = [claim for claim in claims if kinds == set(claim['kinds'])]
             if own:
-                right = any(_holds(claim, 'against_told') for claim in own)
+                right = _holds(own[0], 'against_told')
                 sure = bool(causes[said['cause']]['sure'])
                 out.append([said['kind'], said['features'], right, said['probability'], sure])
     return out
@@ -93,23 +103,23 @@ def taught(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-def reported_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def reported_claims(said: Mapping[str, Any], least: float = REPORTED) -> list[dict[str, Any]]:
     """
     Return what is reported by name: sets of kinds, their joints, and whether each is placed.
 
-    Names reported as alike are one claim. Of many small errors every kind is a claim of its own.
+    Names reported as alike are one claim.
+
+    least: probability from which on a cause counts as reported.
     """
     out: dict[tuple[str, ...], dict[str, Any]] = {}
     for cause in said['causes']:
         names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].traits.cause]
-        if cause['probability'] <= REPORTED or cause['rest'] or not names:
+        if cause['probability'] <= least or cause['rest'] or not names:
             continue
-        many = said['families'] and all(p > REPORTED for _, _, p in names)
-        for group in [[name] for name in names] if many else [names]:
-            kinds = tuple(sorted({kind for kind, _, _ in group}))
-            claim = out.setdefault(kinds, {'kinds': list(kinds), 'joints': [], 'share': 0.0})
-            claim['joints'] += [joint for _, joint, _ in group if joint is not None]
-            claim['share'] += cause['share'] / (len(names) if many else 1)
+        kinds = tuple(sorted({kind for kind, _, _ in names}))
+        claim = out.setdefault(kinds, {'kinds': list(kinds), 'joints': [], 'share': 0.0})
+        claim['joints'] += [joint for _, joint, _ in names if joint is not None]
+        claim['share'] += cause['share']
     for claim in out.values():
         joints = [REGISTRY[kind].of in ('joint', 'link') for kind in claim['kinds']]
         claim['placed'] = bool(claim['joints']) or not any(joints)

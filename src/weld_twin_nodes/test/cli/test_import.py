@@ -47,6 +47,16 @@ def test_degrees_and_millimetres_arrive_as_radians_and_metres(weld_twin, tmp_pat
     assert 'base and tool frame not fitted: RMS 2.000 mm, max 2.000 mm' in result.out
 
 
+def test_a_list_of_numbers_may_begin_with_a_sign(weld_twin, tmp_path, table):
+    file, q, _ = table
+    shifted = ('--joint-offsets', '-5,0,0,0,0,.5', '--joint-signs', '-1,1,1,1,1,1')
+    result = weld_twin('import', file, '--robot', 'ur5', *shifted, '--out', tmp_path / 'bag')
+    assert result.code == 0, result.err
+    expected = q * [-1.0, 1.0, 1.0, 1.0, 1.0, 1.0] + np.radians([-5.0, 0.0, 0.0, 0.0, 0.0, 0.5])
+    recording = read_recording(tmp_path / 'bag', ROBOT)
+    np.testing.assert_allclose(recording.joints.q, expected, rtol=0.0, atol=1e-13)
+
+
 def test_deviations_come_as_table_and_picture_too(weld_twin, tmp_path, table):
     csv, png = tmp_path / 'off.csv', tmp_path / 'off.png'
     weld_twin(

@@ -196,6 +196,8 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **more: Any) -> None:
         super().__init__(**more | {'add_help': False})
         self.example = ''
+        # Several numbers may begin with a sign as one may: --joint-offsets -90,0,... is no option.
+        self._negative_number_matcher = re.compile(r'^-\.?\d')
         hidden: dict[str, Any] = {
             'nargs': 0,
             'help': argparse.SUPPRESS,

@@ -63,3 +63,7 @@ def test_three_strays_of_forty_stations_spoil_neither_the_name_nor_what_is_promi
     # Of the gap of half a millimetre no more than the noise is left.
     assert result.shrink.rms_after_m < 5e-5
     assert result.shrink.ratio < 0.1
+    # All figures are of the same readings.
+    assert not any(result.traces.trusted[0][[4, 18, 31]])
+    alone = result.model.alone
+    assert max(alone.recorded_m, alone.whole_recorded_m) < 5e-5

@@ -198,7 +198,7 @@ def _conclude(
     """Return the diagnosis of what was found."""
     holdout = examined.mended(holdout)
     result = borne_out(result, holdout, beliefs)
-    unseen, leftover = _without_strays(result, beliefs)
+    result, unseen, leftover, with_strays = _without_strays(result, beliefs)
     progress('looked for what is left')
     residuals = result.problem.residuals(result.final.model)
     # As many coordinates as rows leave nothing of a noise that is there all the same.
@@ -206,7 +206,7 @@ def _conclude(
     floor = noise_floor(result.problem, residuals, expected)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     families = weighed_families(result, unseen, beliefs) if result.dense else None
-    evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs)
+    evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs, with_strays)
     table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
@@ -229,25 +229,30 @@ def _conclude(
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
 
 
-def _without_strays(result: Search, beliefs: Beliefs) -> tuple[Unseen, Structure]:
+def _without_strays(result: Search, beliefs: Beliefs) -> tuple[Search, Unseen, Structure, float]:
     """
-    Return unseen parts of the data, and what generic columns find there.
+    Return what was found, unseen parts of the data, and what generic columns find there.
 
     Readings that stray by themselves are noise, and are left out, unless something regular is left
-    with them: a cause that shows at few places only looks like strays.
+    with them: a cause that shows at few places only looks like strays. What is left with them on unseen
+    data, RMS [m], comes last.
     """
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     model, baseline = result.final.model, result.baseline
-    leftover, apart = structure(unseen, model, baseline, beliefs), unseen.apart_from_strays()
-    if apart is unseen or beyond_doubt(leftover, beliefs):
-        return unseen, leftover
-    return apart, structure(apart, model, baseline, beliefs)
+    leftover, left = structure(unseen, model, baseline, beliefs), unseen.rms(unseen.whole)
+    apart = result.apart_from_strays()
+    if apart is result or beyond_doubt(leftover, beliefs):
+        return result, unseen, leftover, left
+    unseen = Unseen.of(apart.problem, apart.scale, apart.final, apart.precision)
+    return apart, unseen, structure(unseen, model, baseline, beliefs), left
 
 
 def _alone(result: Search, shrink: Shrink) -> Search:
     """Return what was found with what a robot file alone does of it."""
     model = result.final.model
-    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
+    own = replace(
+        model, alone=alone(result.problem, model, result.scale, shrink, many=result.dense)
+    )
     return replace(result, final=replace(result.final, model=own))
 
 

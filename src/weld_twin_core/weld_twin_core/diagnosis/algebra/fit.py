@@ -364,6 +364,15 @@ def strays(weights: Sequence[Array], least: float = TRUSTED) -> list[NDArray[np.
     return [part & few for part in result]
 
 
+def without_strays(scale: Scale) -> Scale:
+    """Return a scale with no weight for samples that stray by themselves; itself without any."""
+    out = strays(scale.weights)
+    if not any(part.any() for part in out):
+        return scale
+    pairs = zip(out, scale.weights, strict=True)
+    return replace(scale, weights=tuple(np.where(stray, 0.0, own) for stray, own in pairs))
+
+
 def robust_fit(
     problem: Problem, model: Model, scale: Scale, precision: Array | None = None, rounds: int = 2
 ) -> tuple[Fit, Scale]:

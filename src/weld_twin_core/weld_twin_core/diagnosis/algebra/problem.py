@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.channels import Shift
 from ...arm.robot import Robot
@@ -412,6 +413,18 @@ class Problem:
             out.append(recording.with_measured(measured.take(index)))
         return replace(self, recordings=tuple(out))
 
+    def thinned_with(self, scale: Scale, most_rows: int) -> tuple[Problem, Scale]:
+        """Return `thinned`, and a scale with the weights that belong to it."""
+        thin = self.thinned(most_rows)
+        if thin is self:
+            return self, scale
+        kept = []
+        for full, part, weight in zip(
+            self.recordings, thin.recordings, scale.weights, strict=True
+        ):
+            kept.append(weight[np.searchsorted(full.seen.t, part.seen.t)])
+        return thin, replace(scale, weights=tuple(kept))
+
     def unit_scale(self) -> Scale:
         """Return a scale before anything is known of the noise."""
         return Scale(1e-4, 2e-4, tuple(self.given_weights))
@@ -445,7 +458,8 @@ class Scale:
     """
     Noise that residuals are measured in: position [m], orientation [rad], weight per sample.
 
-    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier.
+    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier, 0 for one
+    that is left out.
     """
 
     position: float
@@ -456,6 +470,11 @@ class Scale:
     def roots(self) -> list[Array]:
         """Return the square root of every weight."""
         return [np.sqrt(weight) for weight in self.weights]
+
+    @property
+    def left_out(self) -> list[NDArray[np.bool_]]:
+        """Return which samples are left out, (M,) per recording."""
+        return [weight == 0.0 for weight in self.weights]
 
 
 class Change(NamedTuple):

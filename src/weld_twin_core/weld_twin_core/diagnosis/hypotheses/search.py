@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
-from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
+from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale, without_strays
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
@@ -75,6 +75,14 @@ class Search:
         """Return what was taken out of the library and fits clearly better than what was found."""
         robot = self.final.model.robot
         return tuple(effect for effect in self.refused if not beyond(robot, effect))
+
+    def apart_from_strays(self) -> Search:
+        """Return the same with no weight for readings that stray by themselves; itself without any."""
+        scale = without_strays(self.scale)
+        if scale is self.scale:
+            return self
+        left = self.problem.whitened(self.problem.residuals(self.final.model), scale)
+        return replace(self, scale=scale, final=replace(self.final, residual=left))
 
     def effective(self, result: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""

@@ -84,7 +84,9 @@ def _beside(
     scale = robust_scale(full, full.residuals(fit(small, model, scale, precision, 4).model))
     final, scale = robust_fit(full, model, scale, precision, rounds=1)
     changed = replace(result, final=final, scale=scale, precision=precision, dense=False)
-    unseen = Unseen.of(full, scale, final, precision)
+    if any(part.any() for part in result.scale.left_out):
+        changed = changed.apart_from_strays()
+    unseen = Unseen.of(full, changed.scale, changed.final, precision)
     return Curved(form, bare.model.found, changed, unseen)
 
 
@@ -109,7 +111,7 @@ def choose_model(
     if verdict.status != 'unknown' and not nothing:
         return result, unseen, shrink, verdict
     if alternative is not None:
-        there = alternative.unseen.judged_as(unseen)
+        there = alternative.unseen
         if _worth(unseen, there, verdict, beliefs):
             result, unseen = alternative.found, there
             shrink = held_out_shrink(result, unseen, holdout, beliefs)
@@ -121,8 +123,7 @@ def choose_model(
     bare = result.problem.whitened(result.problem.residuals(result.baseline.model), result.scale)
     final = replace(result.baseline, residual=bare)
     result = replace(result, final=final, precision=np.zeros(0), candidate_sets=(), dense=False)
-    alone = Unseen.of(result.problem, result.scale, result.final, result.precision)
-    unseen = alone.judged_as(unseen)
+    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     return result, unseen, shrink, replace(verdict, sets=())
 

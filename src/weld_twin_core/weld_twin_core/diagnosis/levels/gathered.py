@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ def gathered(
     floor: NoiseFloor,
     families: tuple[Family, ...] | None,
     beliefs: Beliefs,
+    with_strays: float,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -41,6 +41,7 @@ def gathered(
     leftover: what generic columns still find beside it.
     shrink: on held-out recordings or by cross-validation.
     families: what each kind accounts for, where many small errors were fitted together.
+    with_strays: what is left on unseen data with the readings that are left out, RMS [m].
     """
     robot, parts = result.final.model.robot, unseen.targets[1:]
     total = parts.sum(axis=0)
@@ -62,8 +63,8 @@ def gathered(
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
-        strays=_named(recordings, unseen.strays) if unseen.apart else (),
-        with_strays=replace(unseen, apart=False).rms(unseen.whole),
+        strays=_named(recordings, result.scale.left_out),
+        with_strays=with_strays,
         scattered=scattered(result, unseen, beliefs),
         stations=any(recording.joints.static for recording in recordings),
     )

@@ -71,7 +71,7 @@ def allowed(
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
     recordings = problem.recordings
-    problem, scale = _thinned(problem, _noisy(scale))
+    problem, scale = problem.thinned_with(_noisy(scale), ROWS)
     what = _directions(problem, model)
     prior = _prior(what, model)
     rows = _rows(problem, model, scale, what, prior)
@@ -228,17 +228,6 @@ def _uneven(coordinates: Array, what: Directions) -> Array:
     """Return how uneven the gear of every joint is beyond its waves, RMS of its fine curve [rad]."""
     begins = what.count - np.cumsum([knots.size for knots in what.knots[::-1]])[::-1]
     return np.array([np.sqrt((h**2).mean()) for h in np.split(coordinates, begins)[1:]])
-
-
-def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
-    """Return fewer measurements of a long recording, with the weights that belong to them."""
-    thin = problem.thinned(ROWS)
-    if thin is problem:
-        return problem, scale
-    kept = []
-    for full, part, weight in zip(problem.recordings, thin.recordings, scale.weights, strict=True):
-        kept.append(weight[np.searchsorted(full.seen.t, part.seen.t)])
-    return thin, replace(scale, weights=tuple(kept))
 
 
 def _prior(what: Directions, model: Model) -> Prior:

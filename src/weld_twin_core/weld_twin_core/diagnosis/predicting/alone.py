@@ -25,8 +25,8 @@ from ...effects.frame_errors import FrameError
 from ...effects.geometry import ChannelError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
-from ..algebra.fit import effect_precision, fit, frame_offset, robust_scale, trusted
-from ..algebra.problem import Alone, Model, Problem
+from ..algebra.fit import effect_precision, fit, frame_offset, trusted
+from ..algebra.problem import Alone, Model, Problem, Scale
 from ..result import Shrink
 from ..unseen.unseen_stretches import Unseen
 
@@ -39,11 +39,13 @@ STEPS = 2
 """Steps of a fit that starts nearby; constants are nearly linear."""
 
 
-def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False) -> Alone | None:
+def alone(
+    problem: Problem, model: Model, scale: Scale, shrink: Shrink, *, many: bool = False
+) -> Alone | None:
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
 
-    model: the whole model, fitted.
+    model, scale: the whole model, fitted, and what it leaves.
     shrink: what the whole model leaves on data that were not fitted.
     many: whether many small errors were fitted together, of which none is certain by itself. Else
     constants that were found mean the arm, and stay: frames and other zeros give way.
@@ -56,8 +58,7 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
     """
     if problem.touched or not model.found + model.known:
         return None
-    problem = problem.thinned(ROWS)
-    scale = robust_scale(problem, problem.residuals(model))
+    problem, scale = problem.thinned_with(scale, ROWS)
     good = trusted(scale.weights)
     whole = _rms(problem, model, good)
     constants = _constants(model)

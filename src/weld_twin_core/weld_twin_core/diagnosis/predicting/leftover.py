@@ -127,7 +127,8 @@ class Predicted:
         seen = np.arange(6) < np.repeat(problem.rows, problem.samples)[:, None]
         place, wide = np.nonzero(seen), 3 if max(problem.rows) <= 3 else 6
         unit = np.repeat([scale.position, scale.orientation], 3)[place[1]]
-        unit /= np.sqrt(np.concatenate(scale.weights)[place[0]])
+        weight = np.concatenate(scale.weights)[place[0]]
+        unit = np.divide(unit, np.sqrt(weight), out=np.zeros_like(unit), where=weight > 0.0)
 
         def by_sample(rows: Array, width: int = 6) -> Array:
             out = np.zeros((*rows.shape[:-1], len(seen), width))

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
-from ..algebra.fit import Fit, frame_prior, strays, trusted
+from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.starts import chosen_anew
 from .folds import STRETCHES, Gain, gain, ways_to_divide
@@ -77,8 +77,6 @@ class Unseen:
     searched: Callable[[bytes], Mapping[int, Array]] = lambda labels: {}
     """Returns what each effect that a search alone chooses takes off beyond what it takes off now
     if it is chosen without each stretch, (stretches, rows) by its number; asked with the labels."""
-    apart: bool = False
-    """Whether readings that stray by themselves are left out of what is judged."""
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
@@ -383,19 +381,6 @@ class Unseen:
         """Return the RMS position error over trusted samples, [m]."""
         return float(np.sqrt(self.squares(residual).mean()))
 
-    @cached_property
-    def strays(self) -> list[NDArray[np.bool_]]:
-        """Return which samples stray by themselves, (M,) per recording."""
-        return strays(self.scale.weights)
-
-    def apart_from_strays(self) -> Unseen:
-        """Return the same, judged on readings that do not stray by themselves."""
-        return replace(self, apart=True) if any(part.any() for part in self.strays) else self
-
-    def judged_as(self, other: Unseen) -> Unseen:
-        """Return the same, apart from strays where another is."""
-        return self.apart_from_strays() if other.apart else self
-
     def turn_rms(self, residual: Array) -> float | None:
         """Return the RMS orientation error over trusted samples [rad], None without any."""
         rows = self.problem.measured_rows(residual, self.scale)
@@ -410,12 +395,7 @@ class Unseen:
     @cached_property
     def _good(self) -> list[NDArray[np.bool_]]:
         """Return which samples are judged, (M,) per recording."""
-        good = trusted(self.scale.weights)
-        return (
-            [own & ~stray for own, stray in zip(good, self.strays, strict=True)]
-            if self.apart
-            else good
-        )
+        return trusted(self.scale.weights)
 
     @cached_property
     def _trusted_weights(self) -> Array:

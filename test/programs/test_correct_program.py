@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
 from weld_twin_lab.programs import plain_readers as readers
@@ -216,6 +217,68 @@ def test_a_seam_with_a_move_that_is_worked_out_is_left_whole(line, tmp_path):
     assert said.code == 0, said.err
     assert 'left as it was' in said.out and 'line 4' in said.out
     assert (tmp_path / 'out' / 'seam.script').read_text().splitlines()[:5] == text.splitlines()[:5]
+
+
+FANUC_TURN = """/PROG  P
+/MN
+   1:  J P[1] 20% FINE    ;
+   2:  J P[2] 20% FINE    ;
+/POS
+P[1]{{
+   GP1:
+	UF : 0, UT : 1,
+	J1= 8.0 deg, J2= 15.0 deg, J3= -10.0 deg, J4= 4.0 deg, J5= -75.0 deg, J6= {a6} deg
+}};
+P[2]{{
+   GP1:
+	UF : 0, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X = {0} mm, Y = {1} mm, Z = {2} mm,
+	W = {3} deg, P = {4} deg, R = {5} deg
+}};
+/END
+"""
+KUKA_TURN = """DEF P()
+$TOOL=$NULLFRAME
+$BASE=$NULLFRAME
+PTP {{A1 8, A2 -85, A3 100, A4 5, A5 70, A6 {a6}}}
+PTP {{X {0}, Y {1}, Z {2}, A {5}, B {4}, C {3}, S 2, T {turn}}}
+END
+"""
+
+
+@pytest.mark.parametrize(
+    ('robot', 'name', 'text', 'a6', 'turn', 'left'),
+    [
+        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.02, 2, True),
+        ('kuka_kr16_2', 'p.src', KUKA_TURN, -0.02, 34, False),
+        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.0, 34, False),
+        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.0, 2, True),
+        ('kuka_kr16_2', 'p.src', KUKA_TURN, 3.0, 2, False),
+        ('fanuc_m10ia', 'p.ls', FANUC_TURN, -179.98, 0, True),
+        ('fanuc_m10ia', 'p.ls', FANUC_TURN, -179.9, 0, False),
+    ],
+)
+def test_an_axis_that_would_pass_where_a_flag_changes_is_left(
+    robot, name, text, a6, turn, left, tmp_path
+):
+    # The last axis stands off by 0.057 degrees, and is to be commanded that much lower.
+    arm = wt.load(robot)
+    near = {'kuka_kr16_2': [8, -85, 100, 5, 70, a6], 'fanuc_m10ia': [8, 15, 5, 4, -75, a6]}[robot]
+    where = tool_pose(arm, np.radians(near), arm.T_flange_tool)
+    height = 0.45 if name == 'p.ls' else 0.0
+    turned = Rotation.from_matrix(where[:3, :3]).as_euler('xyz', degrees=True)
+    place = [*(where[:3, 3] - [0.0, 0.0, height]) * 1e3, *turned]
+    (tmp_path / name).write_text(
+        text.format(*(f'{value:.4f}' for value in place), a6=a6, turn=turn)
+    )
+    last = arm.joint_names[-1]
+    (tmp_path / 'off.yaml').write_text(f'- {{effect: joint_offset, joint: {last}, offset: 1e-3}}')
+    said = weld_twin(
+        *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
+        *('--model', tmp_path / 'off.yaml', '--tool', '1=0,0,0,0,0,0'),
+    )
+    assert said.code == 0, said.err
+    assert ('axis 6 would pass an angle at which the flags' in said.out) == left, said.out
 
 
 def test_a_point_that_the_program_changes_itself_is_left(tmp_path):

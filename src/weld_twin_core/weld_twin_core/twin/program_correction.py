@@ -27,7 +27,7 @@ from ..arm.rotation import moved as displaced
 from ..arrays import Array
 from ..errors import DataError, PathError
 from ..motion.inverse.newton import least_step
-from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
+from ..motion.programs import Move, MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.travel import repeated, unrelenting
 from ..recording import JointMotion
 from .posterior import Drawn, largest_sigma
@@ -203,7 +203,9 @@ class _Work(NamedTuple):
                 continue
             shares = self._trust(piece)
             for k, move in enumerate(piece.moves):
-                why = self._why_not(moved, piece, k, shares)
+                why = self._why_not(moved, piece, k, shares) or _wound(
+                    move, *(each.q[piece.ends[k]] for each in (piece.motion, motion))
+                )
                 if why:
                     out.setdefault(move.seam, f'{move.where}: {why}')
         return {seam: why for seam, why in out.items() if seam not in remaining}
@@ -323,6 +325,18 @@ class _Work(NamedTuple):
             by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
             out.append(_MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
         return tuple(out)
+
+
+def _wound(move: Move, before: Array, after: Array) -> str:
+    """Return that the flags of a point, which stay as written, would wind an axis round."""
+    axes = () if move.astray is None else move.astray(before, after)
+    if not axes:
+        return ''
+    named = ', '.join(map(str, axes))
+    return (
+        f'axis {named} would pass an angle at which the flags of the point change, and these stay as '
+        'written: the controller would turn it by 360 degrees; give this point in joints'
+    )
 
 
 def _worse(before: float, after: float) -> str:

@@ -24,6 +24,9 @@ from .source import Notation, Number, Source
 Suits = Callable[[Controller], Callable[[Array], Array]]
 """Makes, for a controller, what tells the postures that a program asks for."""
 
+Astray = Callable[[Controller], Callable[[Array, Array], tuple[int, ...]]]
+"""Makes, for a controller, what tells the axes that leave where a point's flags have them."""
+
 
 class Point(NamedTuple):
     """A point of a program."""
@@ -73,6 +76,7 @@ class Step:
     dwell: float = 0.0
     duration: float = 0.0
     suits: Suits | None = None
+    astray: Astray | None = None
     why: str = ''
     along: bool = True
 
@@ -219,6 +223,7 @@ def _move(
         step.dwell,
         step.duration,
         None if step.suits is None else step.suits(controller),
+        None if step.astray is None else step.astray(controller),
         step.where,
         seam,
         along=along,
@@ -256,10 +261,8 @@ def turn_bits(turn: int) -> Suits:
     """
 
     def suits(controller: Controller) -> Any:
-        back = np.linalg.inv(controller.mix)
-
         def of(q: Array) -> Array:
-            axes = q @ back.T[:, : q.shape[1] - len(controller.external)]
+            axes = _shown(controller, q)
             below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
             fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
             return np.asarray(fits.all(axis=1))
@@ -267,6 +270,43 @@ def turn_bits(turn: int) -> Suits:
         return of
 
     return suits
+
+
+FLAG_DOUBT = np.radians(1e-3)
+"""An axis this near where a flag changes may count to either side: points have no more digits."""
+
+
+def signs_kept(turn: int) -> Astray:
+    """Return what tells the axes that have not the signs of T, as `turn_bits` takes it."""
+
+    def of(controller: Controller) -> Any:
+        def astray(_: Array, after: Array) -> tuple[int, ...]:
+            axes = _shown(controller, after)
+            below = np.array([bool(turn >> k & 1) for k in range(axes.size)])
+            away = np.where(below, axes, -axes)
+            return tuple((np.flatnonzero(away > FLAG_DOUBT) + 1).tolist())
+
+        return astray
+
+    return of
+
+
+def half_turns_kept(controller: Controller) -> Any:
+    """Return what tells the axes 1, 4 and 6 that pass 180 degrees, where flags count their turns."""
+
+    def astray(before: Array, after: Array) -> tuple[int, ...]:
+        both = np.stack([_shown(controller, q) for q in (before, after)])
+        turns = np.round(both / (2.0 * np.pi))
+        passed = (turns[0] != turns[1]) & (np.abs(both[1] - both[0]) > FLAG_DOUBT)
+        return tuple(axis for axis in (1, 4, 6) if passed[axis - 1 : axis].any())
+
+    return astray
+
+
+def _shown(controller: Controller, q: Array) -> Array:
+    """Return the arm's own axes as the controller shows them, of joint positions (..., n)."""
+    back = np.linalg.inv(controller.mix)
+    return np.asarray(q @ back.T[:, : q.shape[-1] - len(controller.external)])
 
 
 def quadrants(conf: Sequence[int]) -> Suits:

@@ -23,7 +23,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step
+from .build import Program, Ref, Step, half_turns_kept
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -197,6 +197,7 @@ class FanucReader(Reader):
     def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
         assert point is not None
         tool, base = self.frames[point]
+        flags = kind == 'joint' and not self.program.points[point].notation.joints
         step = Step(
             kind,
             where,
@@ -207,6 +208,7 @@ class FanucReader(Reader):
             _speed(kind, tail),
             re.search(r'\bFINE\b', tail) is not None,
             along=re.search(r'\bCOORD\b', tail) is not None,
+            astray=half_turns_kept if flags else None,
         )
         self.program.add(step)
 

@@ -25,7 +25,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step
+from .build import Program, Ref, Step, half_turns_kept
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -163,6 +163,7 @@ class InformReader(Reader):
     def _step(self, kind: Kind, where: str, point: int, rest: str) -> Step:
         level = re.search(r'\bPL=(\d+)', rest)
         tool, base = self.frames[point]
+        flags = kind == 'joint' and not self.program.points[point].notation.joints
         return Step(
             kind,
             where,
@@ -172,6 +173,7 @@ class InformReader(Reader):
             base,
             _speed(kind, rest),
             level is not None and level[1] == '0',
+            astray=half_turns_kept if flags else None,
         )
 
 

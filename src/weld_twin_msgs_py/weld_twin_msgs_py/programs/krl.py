@@ -28,7 +28,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, turn_bits
+from .build import Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -109,7 +109,7 @@ class KrlReader(Reader):
         self.data: dict[str, Aggregate] = {}
         self.frames: dict[str, Array] = {}
         self.used: list[set[int]] = [set() for _ in sources]
-        self.suits: dict[int, Suits] = {}
+        self.turns: dict[int, int] = {}
         self.state = _State()
         self.kinematic = ''
         self.tools: list[Frame] = []
@@ -207,7 +207,7 @@ class KrlReader(Reader):
                     self.program.hold(point, f'{name} moves external axes')
                 turn = content.numbers.get('T')
                 if turn is not None and notation is KUKA_POSE:
-                    self.suits[point] = turn_bits(int(turn.value))
+                    self.turns[point] = int(turn.value)
                 return point
         return None
 
@@ -394,6 +394,7 @@ class KrlReader(Reader):
         self, kind: Kind, where: str, ends: Sequence[int], frames: tuple[Frame, Frame], tail: str
     ) -> Step:
         speed = self.state.joint_speed if kind == 'joint' else self.state.speed
+        turn = self.turns.get(ends[-1])
         own = re.search(rf'\$VEL(?:\.CP)?\s*=\s*(?:SVEL_CP\s*\(\s*)?({NUMBER})', tail)
         return Step(
             kind,
@@ -403,7 +404,9 @@ class KrlReader(Reader):
             *frames,
             speed if own is None else max(float(own[1].rstrip('.')), LEAST_SPEED),
             re.search(r'\bC_(DIS|PTP|VEL|ORI|SPL)\b', tail) is None,
-            suits=self.suits.get(ends[-1]),
+            suits=None if turn is None else turn_bits(turn),
+            # Straight moves take no notice of it.
+            astray=signs_kept(turn) if turn is not None and kind == 'joint' else None,
         )
 
     def _parts(self, start: int, end: int) -> list[tuple[int, int]]:

@@ -54,6 +54,9 @@ class Move(NamedTuple):
     """How long it takes, where the program says so [s]; else 0."""
     suits: Callable[[Array], Array] | None = None
     """Takes joint positions (K, n), says which of them are the posture the program asks for."""
+    astray: Callable[[Array, Array], tuple[int, ...]] | None = None
+    """Takes joint positions (n,) before and after a correction, returns the numbers of the axes, counted
+    from 1, that the second has where the flags written with the point do not have them."""
     where: str = ''
     """File and line, for messages."""
     seam: int = 0

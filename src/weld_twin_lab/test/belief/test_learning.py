@@ -23,9 +23,10 @@ def logistic(x):
 
 def examples(count, seed, slope=2.0, kinds=tuple(TERMS)):
     """Return statements that are right by a law in one feature alone, which not all have."""
-    rng = np.random.default_rng(seed)
     out = []
     for kind in kinds:
+        # What one kind is learned from leaves the draws of the others as they are.
+        rng = np.random.default_rng([seed, *kind.encode()])
         first = next(iter(TERMS[kind]))
         way = TERMS[kind][first] or 1
         for k, x in enumerate(rng.standard_normal(count)):
@@ -85,6 +86,20 @@ def test_a_family_named_alone_counts_where_it_was_seen_often_and_others_do_not()
     weights = learned(rows, {})['statements']['name']['weights']
     assert weights['only backlash']['weight'] < -1.0 < 0.0 < weights['only drift']['weight']
     assert 'only wear' not in weights
+
+
+def test_a_set_of_many_names_is_believed_more_where_it_was_right_more_often():
+    rng = np.random.default_rng(8)
+    others = tuple(kind for kind in TERMS if kind != 'name of many')
+    rows = examples(200, 8, kinds=others)
+    for k in range(400):
+        members = float(rng.integers(1, 6))
+        right = bool(rng.random() < logistic(members - 2.0))
+        features = {**dict.fromkeys(TERMS['name of many'], 0.0), 'members': members}
+        rows.append(Example(f'8/{k}', 'name of many', features, right, 0.5))
+    told = calibration_from(learned(rows, {}))
+    one, many = (told.probability('name of many', {'members': m}) for m in (1.0, 4.0))
+    assert one < 0.4 < 0.8 < many
 
 
 def test_an_answer_is_learned_from_its_name_as_new_weights_report_it():

@@ -79,7 +79,8 @@ TERMS: dict[str, dict[str, int]] = {
         'angle': 0,
         'wander': 0,
     },
-    'name of many': {**MANY, 'left': 0},
+    # A set with more names is likelier to hold the right one.
+    'name of many': {**MANY, 'left': 0, 'members': 1},
     'place of many': MANY,
     'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},

@@ -267,6 +267,57 @@ def test_a_routine_has_the_tool_of_its_program_where_that_is_one(language, text,
         np.testing.assert_allclose(away, length, atol=1e-12)
 
 
+KRL_SEAM = 'LIN {X 900,Y 0,Z 800,A 0,B 90,C 0}\n'
+UR_SEAM = 'movel(p[0.3,0.2,0.1,0,3.1,0])\n'
+KRL_LONG, KRL_SHORT = KRL_TOOL.format(250), KRL_TOOL.format(90)
+UR_LONG, UR_SHORT = UR_TOOL.format(0.25), UR_TOOL.format(0.09)
+
+
+@pytest.mark.parametrize(
+    ('language', 'parts', 'known'),
+    [
+        ('krl', ['IF x THEN', KRL_SHORT, 'ENDIF', KRL_SEAM], [False]),
+        ('krl', ['IF x THEN', KRL_LONG, 'ENDIF', KRL_SEAM], [True]),
+        ('krl', ['IF x THEN', KRL_SHORT, KRL_SEAM, 'ELSE', KRL_SEAM, 'ENDIF'], [True, True]),
+        ('krl', ['IF x THEN', KRL_SHORT, 'ELSE', KRL_SHORT, 'ENDIF', KRL_SEAM], [True]),
+        (
+            'krl',
+            ['SWITCH n', 'CASE 1', KRL_SHORT, 'DEFAULT', KRL_LONG, 'ENDSWITCH', KRL_SEAM],
+            [False],
+        ),
+        (
+            'krl',
+            ['SWITCH n', 'CASE 1', KRL_SHORT, 'DEFAULT', KRL_SHORT, 'ENDSWITCH', KRL_SEAM],
+            [True],
+        ),
+        ('krl', ['LOOP', KRL_SEAM, KRL_SHORT, KRL_SEAM, 'ENDLOOP'], [False, True]),
+        ('krl', ['LOOP', KRL_SHORT, KRL_SEAM, 'ENDLOOP', KRL_LONG, KRL_SEAM], [True, True]),
+        ('krl', ['WHILE x', KRL_SHORT, KRL_SEAM, 'ENDWHILE', KRL_SEAM], [True, False]),
+        ('krl', ['IF x THEN', '$IPO_MODE = #TCP', 'ENDIF', KRL_SEAM], [False]),
+        ('krl', ['IF x THEN', '$BASE.X = 5', 'ENDIF', KRL_SEAM], [False]),
+        ('urscript', ['if (x):', UR_SHORT, 'end', UR_SEAM], [False]),
+        ('urscript', ['if (x):', UR_SHORT, 'else:', UR_SHORT, 'end', UR_SEAM], [True]),
+        (
+            'urscript',
+            ['if (x):', UR_SHORT, 'elif (y):', UR_SEAM, 'else:', UR_SHORT, 'end', UR_SEAM],
+            [True, False],
+        ),
+        ('urscript', ['while (True):', UR_SEAM, UR_SHORT, UR_SEAM, 'end'], [False, True]),
+        ('urscript', ['while (True):', UR_SHORT, UR_SEAM, 'end'], [True]),
+    ],
+)
+def test_a_frame_that_not_every_way_sets_is_not_known_after_it(language, parts, known):
+    head, first, end = {
+        'krl': ('DEF a()\n$BASE = $NULLFRAME\n', KRL_LONG, 'END\n'),
+        'urscript': ('def a():\n', UR_LONG, 'end\n'),
+    }[language]
+    text = head + first + ''.join(part.rstrip('\n') + '\n' for part in parts) + end
+    robot = PROGRAMS[language][0]
+    own = context(robot, language).controller
+    (moves,) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
+    assert [move.kind != 'unknown' for move in moves] == known
+
+
 def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     source = (MADE / 'bracket.mod').read_text().replace('[TRUE, [[0,0,250]', '[FALSE, [[0,0,250]')
     robot = wt.load('abb_irb1600')

@@ -28,6 +28,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
+from .blocks import Blocks, Frames, unclear
 from .build import Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
 from .context import Context
 from .controllers import Frame
@@ -66,6 +67,8 @@ OTHER_TOOL, OTHER_BASE = (
 STILL = Frame(
     '', why='the tool stands still there and the robot carries the workpiece ($IPO_MODE is #TCP)'
 )
+MOVING = Frame('')
+"""Of a tool that moves."""
 _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
 _ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
@@ -76,6 +79,12 @@ _ALONG = re.compile(
     re.I,
 )
 """A base that goes along with a positioner; the frame on its flange follows, and a bracket."""
+_BLOCK = re.compile(
+    r'^[ \t]*(?:(IF|SWITCH|LOOP|WHILE|FOR|REPEAT)|(ELSE|CASE|DEFAULT)|'
+    r'(END(?:IF|SWITCH|LOOP|WHILE|FOR)|UNTIL))\b',
+    re.I | re.M,
+)
+"""Where the program branches or goes round, another branch, and where they come together."""
 _AGGREGATE = re.compile(r'\{\s*(?:\w+\s*:)?')
 
 
@@ -114,6 +123,8 @@ class KrlReader(Reader):
         self.kinematic = ''
         self.tools: list[Frame] = []
         self.bases: list[Frame] = []
+        self.blocks = Blocks(self.program, (unclear('$TOOL'), unclear('$BASE'), lambda _: STILL))
+        self.covered: list[str] = []
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
@@ -129,6 +140,7 @@ class KrlReader(Reader):
                 _BAS: self._bas,
                 _WAIT: lambda match: self.dwell(match.span(1)),
                 _ROUTINE: self._routine,
+                _BLOCK: self._block,
             }
         )
         self.settle(OTHER_TOOL, self.tools, tool=True)
@@ -217,6 +229,26 @@ class KrlReader(Reader):
         self.new_piece(result)
         if self.routines > 1:
             self.state.tool, self.state.base = OTHER_TOOL, OTHER_BASE
+
+    def _block(self, result: re.Match[str]) -> None:
+        """Follow tool, base and whether the tool stands still, through branches and loops."""
+        state = self.state
+        now: Frames = (state.tool, state.base, STILL if state.still else MOVING)
+        word = (result[1] or result[2] or result[3]).upper()
+        if result[1]:
+            self.covered.append(word)
+            self.blocks.begin(self.where(result), now, loop=word not in ('IF', 'SWITCH'))
+            return
+        if not self.covered:
+            return
+        last = self.covered[-1]
+        if result[2]:
+            now = self.blocks.branch(now, first=last == 'SWITCH')
+            self.covered[-1] = word
+        else:
+            self.covered.pop()
+            now = self.blocks.end(now, always=last in ('ELSE', 'DEFAULT'))
+        state.tool, state.base, state.still = now[0], now[1], now[2] is STILL
 
     def _use(self, tool: Frame | None, base: Frame | None) -> None:
         """Set tool and base for the moves that follow; None leaves one as it is."""

@@ -24,6 +24,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
+from .blocks import Blocks, unclear
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .context import Context
 from .controllers import Frame
@@ -50,7 +51,7 @@ OTHER_TOOL = Frame(
 """The tool of a routine that has not set its own."""
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'
-    r'(?:if|while|for|(end))\b)'
+    r'(?:(if|while|for)|(elif|else)|(end))\b)'
 )
 _ASSIGNED = re.compile(
     r'(?:^|(?<=;))[ \t]*(?:(?:global|local)[ \t]+)?([A-Za-z_]\w*)((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)'
@@ -73,20 +74,28 @@ class UrscriptReader(Reader):
 
     def read(self) -> Program:
         self._declare()
-        blocks: list[Frame | None] = []  # those that are open; of a routine the tool around it
+        routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
+        blocks, ways = Blocks(self.program, (unclear('set_tcp'),)), list[str]()
         for result in _WORD.finditer(self.text):
             if result[5]:
                 self._statement(result)
             elif result[6]:
-                blocks.append(self.tool)
+                routines.append(self.tool)
                 self.new_piece(result)
                 self.tool = OTHER_TOOL if self.routines > 1 else self.tool
-            elif not result[7]:
-                blocks.append(None)
-            elif blocks and (around := blocks.pop()) is not None:
+            elif result[7]:
+                routines.append(None)
+                ways.append(result[7])
+                blocks.begin(self.where(result), (self.tool,), loop=result[7] != 'if')
+            elif result[8] and ways:
+                ways[-1] = result[8]
+                (self.tool,) = blocks.branch((self.tool,))
+            elif result[9] and routines and (around := routines.pop()) is not None:
                 # To define a routine moves nothing: what stands around it goes on as before.
                 self.program.new_piece()
                 self.tool = around
+            elif result[9] and ways:
+                (self.tool,) = blocks.end((self.tool,), always=ways.pop() == 'else')
         self.settle(OTHER_TOOL, self.tools, tool=True)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])

@@ -1,0 +1,95 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which frames hold where a program branches or goes round: nobody knows which way it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .build import Program, Step
+from .controllers import Frame
+
+Unclear = Callable[[str], Frame]
+"""Makes the frame of a place that several ways lead to; takes where they part."""
+Frames = tuple[Frame, ...]
+
+
+@dataclass
+class _Block:
+    """A loop, or branches of which one is taken."""
+
+    where: str
+    loop: bool
+    head: Frames
+    """What holds where it begins."""
+    moves: list[Step]
+    first: int
+    """The routine it stands in, and how many moves stand before it."""
+    ends: list[Frames] = field(default_factory=list)
+    """What holds at the ends of its branches so far."""
+
+
+class Blocks:
+    """
+    Follows frames through branches and loops.
+
+    A frame that not every way sets alike is unclear after them, and in a loop until it is set.
+    """
+
+    def __init__(self, program: Program, unclear: Sequence[Unclear]) -> None:
+        self._program, self._unclear = program, unclear
+        self._open: list[_Block] = []
+
+    def begin(self, where: str, now: Frames, *, loop: bool = False) -> None:
+        """Begin a block, where frames hold now."""
+        moves = self._program.pieces[-1]
+        self._open.append(_Block(where, loop, now, moves, len(moves)))
+
+    def branch(self, now: Frames, *, first: bool = False) -> Frames:
+        """Begin another branch; return what holds there. Before the first, none has ended."""
+        if not self._open:
+            return now
+        if not first:
+            self._open[-1].ends.append(now)
+        return self._open[-1].head
+
+    def end(self, now: Frames, *, always: bool = False) -> Frames:
+        """End a block; return what holds after it. One of its branches may be taken always."""
+        if not self._open:
+            return now
+        block = self._open.pop()
+        ways = [*block.ends, now] if always else [block.head, *block.ends, now]
+        after = []
+        for k, unclear in enumerate(self._unclear):
+            alike = all(_same(way[k], ways[0][k]) for way in ways)
+            after.append(ways[0][k] if alike else unclear(block.where))
+            if block.loop and not alike:
+                self._replace(block, block.head[k], after[k])
+        return tuple(after)
+
+    @staticmethod
+    def _replace(block: _Block, held: Frame, unclear: Frame) -> None:
+        """Let moves of a loop's first round know that a later round finds another frame."""
+        for k, step in enumerate(block.moves[block.first :], block.first):
+            if step.tool is held:
+                block.moves[k] = replace(step, tool=unclear)
+            elif step.base is held:
+                block.moves[k] = replace(step, base=unclear)
+
+
+def unclear(what: str) -> Unclear:
+    """Return what makes a frame that is named by what sets it."""
+    return lambda where: Frame(
+        what, why=f'the numbers of {what} hang on which way the program takes at {where}'
+    )
+
+
+def _same(one: Frame, other: Frame) -> bool:
+    if (one.name, one.moving, one.why) != (other.name, other.moving, other.why):
+        return False
+    if one.value is None or other.value is None:
+        return one.value is other.value
+    return np.array_equal(one.value, other.value)

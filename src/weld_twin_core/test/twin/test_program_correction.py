@@ -60,6 +60,20 @@ def test_a_posture_that_nobody_names_is_taken_only_where_one_is_known(ur5):
     np.testing.assert_allclose(found.pieces[0].motion.q[0], START, atol=1e-9)
 
 
+def test_a_straight_move_to_joint_positions_ends_at_them_though_the_pose_leaves_one_open():
+    robot = wt.load('kuka_iiwa14')
+    begin = np.array([0.2, 0.6, -0.1, -1.2, 0.2, 0.9, 0.1])
+    near, far = [0.2, 0.05, -0.2, 0.1, 0.1, 0.0, -0.1], [0.6, 0.2, -0.5, 0.3, 0.2, 0.1, -0.2]
+    ends = begin + np.array([near, far])
+    straight = (Move('linear', use(k), EYE) for k in (1, 2))
+    program = MoveProgram((begin, *ends), ((Move('joint', use(0), EYE), *straight),))
+    (piece,) = travel(robot, program).pieces
+    np.testing.assert_allclose(piece.motion.q[piece.ends[1:]], ends, atol=1e-9)
+    at = wt.forward(robot, piece.motion.q[piece.ends[1] : piece.ends[2] + 1])[:, :3, 3]
+    off = np.cross(at - at[0], (at[-1] - at[0]) / np.linalg.norm(at[-1] - at[0]))
+    assert np.linalg.norm(off, axis=1).max() < 1e-6
+
+
 def test_a_point_approached_from_two_sides_gets_the_mean_and_says_what_is_left(ur5):
     # Play of 0.2 mrad about the base, beside a zero error: coming from -y and from +y the tool
     # misses point 2 to opposite sides.

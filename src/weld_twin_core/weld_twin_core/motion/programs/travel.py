@@ -153,8 +153,13 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
         raise PathError(_STANDS)
     poses, via = tool_way(arm, course.program, move, forward(arm, q))
     share = np.linspace(0.0, 1.0, len(poses))[:, None]
+    place = course.program.place(move.end)
     way = _on_the_way(
-        chain, poses, q, q[: external.size] + share * (external - q[: external.size])
+        chain,
+        poses,
+        q,
+        q[: external.size] + share * (external - q[: external.size]),
+        q + share * (place - q) if place.ndim == 1 else None,
     )
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
@@ -164,10 +169,19 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
 
 
-def _on_the_way(chain: CarriedArm, poses: Array, q: Array, external: Array) -> Array:
-    """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
+def _on_the_way(
+    chain: CarriedArm, poses: Array, q: Array, external: Array, even: Array | None
+) -> Array:
+    """
+    Return joint positions along poses that begin where the arm stands, shape (K, n).
+
+    even: on an even way to the joint positions at which the program has it arrive, if it says them:
+    poses leave open how an arm of more than six joints stands.
+    """
+    starts = [] if even is None else [even]
     if len(poses) < _SHORT:
-        start = chain.whole(external, np.tile(q[external.shape[1] :], (len(poses), 1)))
+        starts.append(chain.whole(external, np.tile(q[external.shape[1] :], (len(poses), 1))))
+    for start in starts:
         near, error = chain.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
         if np.abs(error).max() < CLOSED and steps < _NEAR:

@@ -173,6 +173,12 @@ def test_what_is_expected_counts_the_way_and_what_an_encoder_rounds(tmp_path):
     assert abs(after / (reach * step / np.sqrt(12.0)) - 1.0) < 0.3
 
 
+@pytest.mark.parametrize('degrees', ['295', '-300', 'nan'])
+def test_a_temperature_in_kelvin_and_one_that_is_none_are_refused(degrees, tmp_path):
+    said = corrected(tmp_path, SEAM, '--temperature', degrees)
+    assert said.code == 2 and 'the temperature is' in said.err
+
+
 def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):
     said = corrected(tmp_path, SEAM, '--max-correction', '0.2mm', '1deg', offset=5e-4)
     assert said.code == 0, said.err

@@ -289,6 +289,25 @@ class JointSignal(Signal):
     _columns: ClassVar[int | None] = None
 
 
+COLDEST, HOTTEST = -273.15, 200.0
+"""Temperatures that can be meant [degC]; above, it must be kelvin."""
+
+
+def checked_temperature(celsius: float) -> float:
+    """
+    Return a temperature [degC].
+
+    Raises DataError: it is not finite, below absolute zero, or so high that it must be in kelvin.
+    """
+    if not np.isfinite(celsius) or celsius < COLDEST:
+        raise DataError(f'the temperature is {celsius} degC, which is no temperature')
+    if celsius > HOTTEST:
+        raise DataError(
+            f'the temperature is {celsius:.6g} degC, which looks like kelvin; give degC'
+        )
+    return celsius
+
+
 class Counted(NamedTuple):
     """How joint positions were made of what the controller shows: ``matrix @ shown + offset``."""
 
@@ -479,10 +498,11 @@ class Recording:
         Raises
         ------
         DataError
-            It is no number.
+            It is no number, or no arm is so cold or warm.
 
         """
-        return replace(self, temperature=Signal(self.joints.t[:1], np.array([celsius])))
+        warm = np.array([checked_temperature(celsius)])
+        return replace(self, temperature=Signal(self.joints.t[:1], warm))
 
     def looking_back(self) -> Recording:
         """

@@ -19,13 +19,14 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import COLDEST, HOTTEST
 
 from ..assembly import Intake, Role, Samples
 from ..assembly.frame_names import OtherFrame
 from ..assembly.intake import UNIT
 from ..assembly.joint_states import Incomplete, Missing
 from ..assembly.stamp_order import Late
-from ..messages.from_messages import COLDEST, HOTTEST, NANOSECONDS, VARIANCES, Unstamped
+from ..messages.from_messages import NANOSECONDS, VARIANCES, Unstamped
 from ..messages.layout import Layout, layout_of
 from .reader import BagReader
 

@@ -19,12 +19,10 @@ import numpy as np
 from weld_twin_core.arm.single_pose import quaternion_matrix
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion
+from weld_twin_core.recording import JointMotion, checked_temperature
 
 NANOSECONDS = 1_000_000_000
 """In a second."""
-COLDEST, HOTTEST = -273.15, 200.0
-"""Temperatures that can be meant [degC]; above, it must be kelvin."""
 VARIANCES = (0, 7, 14)
 """Where the covariance of a pose has the variances of its position."""
 
@@ -201,15 +199,7 @@ def temperature(message: Any) -> float:
     Raises DataError: it is not finite, or below absolute zero, or so high that it must be in
     kelvin.
     """
-    value = float(message.temperature)
-    if not isfinite(value) or value < COLDEST:
-        raise DataError(f'the temperature is {value} degC, which is no temperature')
-    if value > HOTTEST:
-        raise DataError(
-            f'the temperature is {value:.6g} degC, which looks like kelvin; publish degC as '
-            'sensor_msgs/Temperature defines'
-        )
-    return value
+    return checked_temperature(float(message.temperature))
 
 
 def position_sigma(message: Any) -> float | None:

@@ -26,7 +26,7 @@ from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.travel import repeated
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.recording import JointMotion, Recording, checked_temperature
 from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.program_accuracy import SURE, Accuracy, along_seams, conforms
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
@@ -95,8 +95,11 @@ def program_model(
 
     ``path``: diagnosis.json, or an effects file. ``temperature`` [degC]. ``setup``: which base
     frame of the diagnosis, counted from 0.
-    Raises ModelError: the file is of no use, of another robot, or its data were unsound.
+    Raises ModelError: the file is of no use, of another robot, or its data were unsound. Raises
+    DataError: no arm is so cold or warm.
     """
+    if temperature is not None:
+        checked_temperature(temperature)
     content = diagnosis_of(path)
     if 'model' in content or content.get('unsound'):
         placed, model = load_model(robot, path, setup).robot, read_model(robot, path)

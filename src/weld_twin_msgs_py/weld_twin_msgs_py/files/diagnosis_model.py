@@ -110,7 +110,9 @@ def read_model(robot: Robot, path: Path | str) -> Model:
 def counted_of(model: Mapping[str, Any], robot: Robot) -> Counted | None:
     """Return how the controller counts the joints of a model; None where as the robot, or unknown."""
     entry = model.get('counted')
-    return None if entry is None else Counted.from_mapping(entry, robot.n)
+    if entry is None or model.get('kinematics') != fingerprint(robot):
+        return None  # the model of another robot is refused by whoever uses it
+    return Counted.from_mapping(entry, robot.n)
 
 
 def _named(verdict: Any) -> tuple[tuple[str, str | None], ...] | None:

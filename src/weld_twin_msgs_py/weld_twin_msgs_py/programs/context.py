@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import Counted
 
-from .controllers import Controller
+from .controllers import Controller, shown_order
 from .source import Notation, Number, joint_notation
 
 
@@ -23,6 +25,8 @@ class Context(NamedTuple):
     controller: Controller
     pulses_per_degree: Array | None = None
     """Of a Yaskawa arm whose points are in pulses, shape (n,)."""
+    counted: Counted | None = None
+    """How the controller counts the joints, where a recording of it tells."""
 
     @property
     def axes(self) -> int:
@@ -45,10 +49,39 @@ class Context(NamedTuple):
         """Return joint positions in degrees, of sliding joints in millimetres."""
         slides = np.abs(self.controller.mix.T) @ self.robot.prismatic > 0.0
         unit = np.where(slides, 1e-3, np.pi / 180.0)
-        return joint_notation(unit, self.controller.mix, decimals, 'joints in degrees')
+        return self.shown(unit, decimals, 'joints in degrees')
 
     def radians(self, decimals: int = 7) -> Notation:
         """Return joint positions in radians, of sliding joints in metres."""
-        return joint_notation(
-            np.ones(self.robot.n), self.controller.mix, decimals, 'joints in radians'
+        return self.shown(np.ones(self.robot.n), decimals, 'joints in radians')
+
+    def shown(self, unit: Array, decimals: int, name: str) -> Notation:
+        """
+        Return joint positions as the controller shows them.
+
+        They can be neither read nor written where it is known to count otherwise.
+
+        unit: model units of one that is written, shape (n,) [rad or m].
+        """
+        out = joint_notation(unit, self.controller.mix, decimals, name)
+        return out._replace(value=self._refuse, numbers=self._refuse) if self.otherwise() else out
+
+    def otherwise(self) -> str:
+        """Return why joint values of the controller are not known; empty where they are."""
+        if self.counted is None:
+            return ''
+        matrix, offset = self.counted
+        order = abs(shown_order(self.robot, self.controller.external))
+        if not offset.any() and np.allclose(matrix @ order, self.controller.mix):
+            return ''
+        names = self.robot.joint_names
+        off = abs(matrix - np.eye(len(names))).any(axis=1) | (offset != 0.0)
+        which = ', '.join(name for name, one in zip(names, off, strict=True) if one)
+        return (
+            f'the controller counts {which} otherwise, as the table of the recording was read, and '
+            'joint values of its programs are not known here; take poses, or a robot file that counts '
+            'as the controller does'
         )
+
+    def _refuse(self, *_: object) -> NoReturn:
+        raise DataError(self.otherwise())

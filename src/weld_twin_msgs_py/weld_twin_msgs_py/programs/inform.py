@@ -29,7 +29,7 @@ from .build import Program, Ref, Step, half_turns_kept
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
-from .source import YASKAWA_POSE, Notation, Number, Source, joint_notation
+from .source import YASKAWA_POSE, Notation, Number, Source
 
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
@@ -113,7 +113,7 @@ class InformReader(Reader):
                 'of the controller have it, or export the job as a relative job'
             )
         unit = np.radians(1.0 / pulses)
-        return joint_notation(unit, self.context.controller.mix, 0, 'pulses')
+        return self.context.shown(unit, 0, 'pulses')
 
     def _timer(self, result: re.Match[str]) -> None:
         self._close_arc()

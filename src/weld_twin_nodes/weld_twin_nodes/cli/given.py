@@ -161,12 +161,19 @@ class Given(argparse.Namespace):
         if not 0 <= self.trigger <= 9999:
             raise DataError('--trigger must be the number of an output')
 
-    def program_context(self, robot: Robot, language: str) -> Context:
-        """Return the robot and frames of a program; its language says how these are written."""
+    def program_context(self, robot: Robot, language: str, model: str | None = None) -> Context:
+        """
+        Return the robot and frames of a program; its language says how these are written.
+
+        ``model``: what tells how the controller counts joints.
+        """
         import numpy as np
 
+        from weld_twin_msgs_py.files.diagnosis_model import counted_of
         from weld_twin_msgs_py.programs import Context, controller_of
         from weld_twin_msgs_py.programs.controllers import Cell
+
+        from ..offline.given_twin import diagnosis_of
 
         pulses = None
         if self.pulses_per_degree:
@@ -181,7 +188,10 @@ class Given(argparse.Namespace):
             along = frozenset(names - {'none', ''})
         world = _frames([f'world={self.world}'], '--world', language) if self.world else {}
         cell = Cell(self.external, along, world.get('world'))
-        return Context(robot, controller_of(robot, language, tools, bases, cell), pulses)
+        counted = None
+        if model:
+            counted = counted_of(diagnosis_of(model).get('model') or {}, robot)
+        return Context(robot, controller_of(robot, language, tools, bases, cell), pulses, counted)
 
     def read_start(self, robot: Robot) -> Array | None:
         """Return the joint positions of --start, degrees as written, in the model's units."""

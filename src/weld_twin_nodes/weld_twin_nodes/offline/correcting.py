@@ -31,7 +31,7 @@ from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.program_accuracy import SURE, Accuracy, along_seams, conforms
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_msgs_py.files.diagnosis_model import counted_of, load_model, read_model
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.programs import (
     Context,
@@ -41,7 +41,6 @@ from weld_twin_msgs_py.programs import (
     rewritten,
     to_moves,
 )
-from weld_twin_msgs_py.programs.controllers import BY_NAME, shown_order
 from weld_twin_msgs_py.programs.source import Source
 from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
 
@@ -124,35 +123,13 @@ def _refuse_by_effort(effects: Sequence[Effect], path: Path | str) -> None:
         )
 
 
-def counted_otherwise(content: Mapping[str, Any], context: Context, language: str) -> str:
-    """
-    Return why joint values of a program are not those of the robot, by a diagnosis of its recordings.
-
-    Empty where they are, or nothing is known of it. Languages that name joints count as the robot.
-    """
-    counted = counted_of(content.get('model') or {}, context.robot)
-    controller = context.controller
-    if counted is None or language in BY_NAME:
-        return ''
-    order = abs(shown_order(context.robot, controller.external))
-    if not counted.offset.any() and np.allclose(counted.matrix @ order, controller.mix):
-        return ''
-    names = context.robot.joint_names
-    off = abs(counted.matrix - np.eye(len(names))).any(axis=1) | (counted.offset != 0.0)
-    which = ', '.join(name for name, one in zip(names, off, strict=True) if one)
-    return (
-        f'the controller counts {which} otherwise, as the table of the recording was read; give points '
-        'as poses, or diagnose with a robot file that counts as the controller does'
-    )
-
-
 def corrected_program(
     program: Program,
     context: Context,
     model: ProgramModel,
     caps: Caps | None = None,
     start: Array | None = None,  # shape (n,), joint positions before the first move
-    readings: str = '',  # why the model counts joints otherwise: `other_readings`, `counted_otherwise`
+    readings: str = '',  # why the model counts joints otherwise, see `other_readings`
 ) -> CorrectedProgram:
     """
     Return a program corrected so that the real tool goes where it means.
@@ -160,6 +137,8 @@ def corrected_program(
     Raises DataError: there is no move to correct, or none that can be.
     """
     name = program.sources[0].name
+    if start is not None and (why := context.otherwise()):
+        raise DataError(f'--start holds joint values: {why}')
     if readings:
         where = [f'{p.where}: {p.name} holds' for p in program.points if p.value.ndim == 1]
         where += [] if start is None else ['--start holds']

@@ -167,7 +167,12 @@ def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remember
     words = ('correct', program, '--robot', 'ur5', '--model', out / 'diagnosis.json')
     capsys.readouterr()
     assert run(*words, '--out', tmp_path / 'better') == 2
+    assert 'line 2: the controller counts elbow_joint otherwise' in capsys.readouterr().err
+    words = ('investigate', tmp_path / 'plan', '--robot', 'ur5', '--model', out / 'diagnosis.json')
+    words = (*words, '--tolerance', '0.3', '--postures', '3', '--minutes', '9')
+    assert run(*words, '--controller', 'urscript') == 2
     assert 'the controller counts elbow_joint otherwise' in capsys.readouterr().err
+    assert run(*words) == 0
 
 
 def test_a_sound_recording_says_that_nothing_is_wrong(found):

@@ -95,7 +95,7 @@ def _corrected_program(given: Given) -> int:
     """Read, correct, write; say what is expected."""
     robot = given.load_robot()
     language = language_of(read_source(given.program), given.program, given.controller)
-    context = given.program_context(robot, language)
+    context = given.program_context(robot, language, given.model)
     program = read_program(given.program, context, language)
     if given.model:
         return _by_model(given, context, program)
@@ -118,11 +118,8 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     setup = 0 if given.setup is None else given.setup - 1
     model = correcting.program_model(robot, given.model, given.temperature, setup)
     content = diagnosis_of(given.model)
-    readings = other_readings(content) or correcting.counted_otherwise(
-        content, context, program.language
-    )
     made = correcting.corrected_program(
-        program, context, model, caps, given.read_start(robot), readings
+        program, context, model, caps, given.read_start(robot), other_readings(content)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content)

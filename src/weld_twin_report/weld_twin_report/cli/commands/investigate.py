@@ -142,7 +142,7 @@ def _in_region(given: Given, robot: Robot) -> tuple[Array, Array]:
     language = ''
     if Path(given.region).is_file():
         language = language_of(read_source(given.region), given.region, given.controller)
-    context = given.program_context(robot, language or given.controller or 'csv')
+    context = given.program_context(robot, language or given.controller or 'csv', given.model)
     return region(robot, given.region, context, language)
 
 
@@ -150,7 +150,8 @@ def _write_plan(given: Given, robot: Robot, plan: Planned) -> None:
     from weld_twin_nodes.offline.measurement_plan import STATIONS, TABLE, write_plan
 
     # Without a controller the table counts as the model does, which this one's language does too.
-    context = given.program_context(robot, given.controller or 'csv')
+    language, model = given.controller or 'csv', given.model if given.controller else None
+    context = given.program_context(robot, language, model)
     out, lines = Path(given.out), list[str]()
     with given.output(TABLE) as folder:
         write_plan(folder, context, given.controller or None, plan)
@@ -344,6 +345,8 @@ class _Investigation:
         from weld_twin_msgs_py.robots import load_robot
         from weld_twin_nodes.offline.output_directory import new_directory
 
+        from ...report.diagnosis_files import RESULT
+
         given, state = self.given, self.state
         with new_directory(place, mark=EXPERIMENT, force=given.force, shared=True) as made:
             write_joint_motion(made / EXPERIMENT, asked.pop('motion'), asked['sentence'])
@@ -354,7 +357,7 @@ class _Investigation:
             robot = load_robot(state['robot'], *links)
             try:
                 given.check_program()
-                context = given.program_context(robot, given.controller)
+                context = given.program_context(robot, given.controller, str(place / RESULT))
                 lines = _program(given, context, made / EXPERIMENT, place / 'experiment')
             except TwinError as error:
                 lines = [f'note: no program was written: {error}']

@@ -185,6 +185,7 @@ def test_corrected_joints_go_where_they_came_from_and_all_else_stays(velocities)
         (trajectory(velocities=(1.0,)), 'has 3 velocities, or none has any'),
         (trajectory(('track', 'a', 'a')), "names joint 'a' twice"),
         (trajectory(('track', 'a', 'c')), "has no joint 'b'; it has track, a, c"),
+        (trajectory(('l/a', 'l/b', 'r/a', 'r/b')), 'several robots, with the prefixes l/, r/'),
     ],
 )
 def test_goals_that_cannot_be_corrected_are_refused(given, said):

@@ -58,9 +58,14 @@ def _columns(names: list[str], wanted: Sequence[str]) -> tuple[int, ...]:
     if twice is not None:
         raise DataError(f'the goal names joint {twice!r} twice')
     prefixes = [name.removesuffix(wanted[0]) for name in names if name.endswith(wanted[0])]
-    for prefix in ('', *prefixes):
-        if all(prefix + name in names for name in wanted):
-            return tuple(names.index(prefix + name) for name in wanted)
+    fitting = [p for p in ('', *prefixes) if all(p + name in names for name in wanted)]
+    if len(fitting) > 1 and fitting[0]:
+        raise DataError(
+            f'the goal holds the joints of several robots, with the prefixes {", ".join(fitting)}; say '
+            'which with joint_prefix'
+        )
+    if fitting:
+        return tuple(names.index(fitting[0] + name) for name in wanted)
     missing = next(name for name in wanted if name not in names)
     raise DataError(
         f'the goal has no joint {missing!r}; it has {", ".join(names) or "none"}. All joints of the '

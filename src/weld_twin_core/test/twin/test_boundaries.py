@@ -119,6 +119,10 @@ EFFECTS = [
         "effect 'joint_offset': offset must be a number, got 'big'",
     ),
     (
+        {'effect': 'joint_offset', 'joint': 'j0', 'offset': True},
+        "effect 'joint_offset': offset must be a number, got True",
+    ),
+    (
         {'effect': 'joint_offset', 'joint': 'j0', 'offset': [1.0, 2.0]},
         "effect 'joint_offset': offset must be one number, got [1.0, 2.0]",
     ),

@@ -165,6 +165,8 @@ def effects_from_list(entries: Any, robot: Robot) -> tuple[Effect, ...]:
 def _numbers(kind: type[Effect], key: str, value: Any) -> Any:
     size = next((p.size for p in kind.parameters if p.name == key), 0)
     try:
+        if np.asarray(value).dtype.kind == 'b':  # YAML reads yes and on so
+            raise TypeError
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ModelError(f'effect {kind.name!r}: {key} must be a number, got {value!r}') from None

@@ -180,6 +180,13 @@ BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
         ),
         ('name: r\njoints:\n- {name: j, lower: -170, upper: 170}\n', 'lower is -170, which looks'),
         ('name: r\njoints:\n- {name: j, a: 425}\n', 'a is 425, which looks like millimetres'),
+        (
+            'name: r\ntool: {xyz: [0, 0, 250], quat_xyzw: [0, 0, 0, 1]}\njoints:\n- {name: j}\n',
+            'tool is 250 away, which looks like millimetres',
+        ),
+        ('name: r\npayload: {mass: 2, com: [0, 0, 80]}\njoints:\n- {name: j}\n', 'com is 80 away'),
+        ('name: r\ngravity: [0, 0, -1]\njoints:\n- {name: j}\n', 'gravity is 1; it is in m/s^2'),
+        ('name: r\ngravity: [0, 0, -9810]\njoints:\n- {name: j}\n', 'gravity is 9810; it is in'),
         ('name: r\njoints:\n- {name: j, b: 1}\n', "joint 'j' has the unknown key 'b'"),
         ('', 'a robot file must be a mapping of keys, got NoneType'),
         ('[' * 100_000, 'nested too deeply'),

@@ -25,7 +25,9 @@ _TURN = 2.0 * np.pi + 1e-6
 _MANY_TURNS = 60.0
 """Joint limits beyond this [rad] are degrees: no arm turns ten times."""
 _LONG = 20.0
-"""DH lengths beyond this [m] are millimetres."""
+"""Lengths of an arm beyond this [m] are millimetres."""
+_LIGHTEST, _HEAVIEST = 9.5, 10.1
+"""Gravity on earth [m/s^2] is 9.76 to 9.83; people round it to 9.8, and to 10."""
 
 
 def read_urdf(
@@ -324,6 +326,18 @@ def refuse_wrong_units(robot: Robot) -> None:
         _check(names, values, _MANY_TURNS, key, 'degrees in a radian field')
     if robot.com is not None:
         _check(names, abs(robot.com).max(axis=1), _LONG, 'com', 'millimetres in a metre field')
+    places = {
+        'tool': robot.T_flange_tool[:3, 3],
+        "the payload's com": robot.payload_com,
+        **({} if robot.controller is None else {'flange': robot.controller.flange[:3, 3]}),
+    }
+    for key, place in places.items():
+        if abs(place).max() > _LONG:
+            far = f'{abs(place).max():.6g}'
+            raise ModelError(f'{key} is {far} away, which looks like millimetres in a metre field')
+    pull = float(np.linalg.norm(robot.gravity))
+    if pull and not _LIGHTEST < pull < _HEAVIEST:
+        raise ModelError(f'gravity is {pull:.6g}; it is in m/s^2, 9.81 on earth, or 0 for none')
 
 
 def _check(names: Sequence[str], values: Array, limit: float, key: str, what: str) -> None:

@@ -79,7 +79,7 @@ TABLES = {
         ],
     ),
     'target in mm, difference in µm': lines(
-        ','.join([*J, *(f'{a}_t [mm]' for a in 'xyz'), *(f'{a}_dif [µm]' for a in 'xyz')]),
+        ','.join([*J, *(f'{a}_t [mm]' for a in 'xyz'), *(f'{a}_dif [um]' for a in 'xyz')]),
         rows(DEG, MM - 0.25, np.full((12, 3), 250.0)),
     ),
     'blanks between': lines('   '.join([*J, *XYZ]), rows(DEG, MM, sep='  ')),

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
+from weld_twin_core.diagnosis.verdict.decision import NO_GAP, UNEVEN
 
 from .mending import advised, remaining_with
 from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
@@ -216,13 +217,18 @@ def _without(diagnosis: Diagnosis) -> str:
 
 
 def _none(diagnosis: Diagnosis) -> tuple[str, str]:
-    reason, *_ = (*diagnosis.reasons, 'there is no gap above the noise')
-    first = (
-        f'{reason[0].upper()}{reason[1:]}. Measured and model differ by '
-        f'{millimetres(diagnosis.gap.rms_m)}, of which {millimetres(diagnosis.gap.noise_floor_m)} '
-        'is noise.'
+    reason, *_ = (*diagnosis.reasons, NO_GAP)
+    gap, noise = map(millimetres, (diagnosis.gap.rms_m, diagnosis.gap.noise_floor_m))
+    first = f'{reason[0].upper()}{reason[1:]}. Measured and model differ by {gap}'
+    if reason == UNEVEN:
+        return (
+            f'{first}, of which no more than {noise} passes for noise.',
+            'Whether the rest is the robot or the instrument, these data do not tell.',
+        )
+    return (
+        f'{first}, of which {noise} is noise.',
+        'As far as these data reach, the model is the robot.',
     )
-    return first, 'As far as these data reach, the model is the robot.'
 
 
 def _unsound(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from weld_twin_core.diagnosis.result import Candidate, Site, Unexplained
+from weld_twin_core.diagnosis.verdict.decision import UNEVEN
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.wording.quantities import (
     millimetres,
@@ -69,6 +70,15 @@ def test_a_value_has_as_many_digits_as_its_error_allows(value, std, text):
 def test_every_effect_of_the_library_has_a_name_in_words():
     titled = {name for name, effect in REGISTRY.items() if effect.traits.title}
     assert titled == set(REGISTRY) - {'measurement_noise'}
+
+
+def test_what_may_be_the_instrument_or_the_robot_is_not_told_to_be_noise():
+    told = diagnoses.nothing()
+    assert verdict(told)[1] == 'As far as these data reach, the model is the robot.'
+    gap = replace(told.gap, rms_m=0.964e-3, noise_floor_m=0.606e-3)
+    first, second = verdict(replace(told, gap=gap, reasons=(UNEVEN,)))
+    assert 'differ by 0.964 mm, of which no more than 0.606 mm passes for noise' in plain(first)
+    assert second == 'Whether the rest is the robot or the instrument, these data do not tell.'
 
 
 def test_an_effect_of_the_user_is_named_by_its_own_name():

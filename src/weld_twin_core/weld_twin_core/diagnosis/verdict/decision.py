@@ -27,6 +27,12 @@ TINY = 1e-18
 """Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
 LISTED = 8
 """Readings that a sentence lists one by one at the most."""
+NO_GAP = 'there is no gap above the noise'
+UNEVEN = (
+    'nothing is found, but what remains is not spread as noise is, and nothing on these recordings '
+    'shows the noise by itself, so repeat some poses'
+)
+"""Why nothing is told where a floor that only the fit shows leaves it open whether there is a gap."""
 _FOREIGN = (
     'where the evidence was like this, a cause that is not in the library was at work more often '
     'than not, and what was found stood in for a part of it'
@@ -224,12 +230,8 @@ def _of_nothing(remaining: Left) -> Verdict:
     if evidence.scattered:
         return Verdict('unknown', (), tuple(_no_noise(evidence)))
     if not evidence.independent and remaining.rises(beliefs.above):
-        reason = (
-            'nothing is found, but what remains is not spread as noise is, and nothing on these '
-            'recordings shows the noise by itself, so repeat some poses'
-        )
-        return Verdict('none', (), (reason,))
-    return Verdict('none', (), ('there is no gap above the noise',))
+        return Verdict('none', (), (UNEVEN,))
+    return Verdict('none', (), (NO_GAP,))
 
 
 def _of_families(remaining: Left) -> Verdict:

@@ -152,8 +152,8 @@ UNITS = {
 }  # fmt: skip
 """How units are written, and what this project calls them."""
 IN_BRACKETS = {
-    **UNITS, 'in': 'in', '"': 'in', 'k': 'K', 'f': 'degF', 'c': 'degC', '\'': 'ft', 'ft': 'ft', 'um': 'um',
-    'min': 'min', 'h': 'h', 'msec': 'ms', '\N{GREEK SMALL LETTER MU}s': 'us',
+    **UNITS, 'in': 'in', '"': 'in', 'k': 'K', 'f': 'degF', 'c': 'degC', '\'': 'ft', 'ft': 'ft',
+    'um': 'um', 'min': 'min', 'h': 'h', 'msec': 'ms', '\N{GREEK SMALL LETTER MU}s': 'us',
     'n m': 'N m', 'nm': 'N m', 'n*m': 'N m', 'n.m': 'N m', 'n\N{MIDDLE DOT}m': 'N m',
     'n mm': 'N mm', 'nmm': 'N mm', 'n': 'N', '%': '%', 'percent': '%',
 }  # fmt: skip

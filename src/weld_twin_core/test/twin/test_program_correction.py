@@ -4,7 +4,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 import weld_twin_core as wt
 from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
@@ -114,14 +113,18 @@ def test_what_was_found_of_another_tool_is_left_out(ur5):
 
 
 def test_a_move_from_rest_to_rest_takes_as_long_as_its_speed_says(ur5):
-    # A tenth of the speed at a stop, all of it after 0.135 of the way: dt = ds / v, by quadrature.
+    # Speed that rises evenly within 0.2 s, and falls so, takes 0.1 s more at either end.
     there = seam(ur5, Move('linear', use(1), EYE, speed=0.05, stop=True))
     (piece,) = travel(ur5, there).pieces
     first, last = (int(piece.ends[k]) for k in (0, 1))
-    near = quad(lambda s: 1.0 / (0.1 + s / 0.15), 0.0, 0.135)[0]
-    wanted = 0.1 / 0.05 * (1.0 - 2 * 0.135 + 2 * near)
     stay = 0.3
-    assert abs(piece.motion.t[last] - piece.motion.t[first] - stay - wanted) < 1e-9
+    taken = piece.motion.t[last] - piece.motion.t[first] - stay
+    assert taken == pytest.approx(0.1 / 0.05 + 0.2, abs=1e-9)
+    # A centimetre from rest: 5 mm within the 0.2 s, the rest at full speed.
+    begun = np.interp(
+        0.1, np.linspace(0.0, 1.0, last - first - 2), piece.motion.t[first : last - 2]
+    )
+    assert begun - piece.motion.t[first] == pytest.approx(0.3, abs=1e-9)
 
 
 def test_the_model_that_was_found_lies_within_what_is_expected():
@@ -130,3 +133,19 @@ def test_the_model_that_was_found_lies_within_what_is_expected():
     off[..., 0] = 1e-3
     found = accuracy([np.zeros((4, 6))], [Drawn(np.zeros(4, dtype=int), off)])
     assert (found.low, found.high) == (0.0, pytest.approx(1e-3))
+
+
+def test_what_is_expected_of_a_seam_does_not_hang_on_how_many_moves_it_has(ur5):
+    # Two waves to a turn of a motor with a gear of 150: each is hardly longer than a move's steps.
+    wave = wt.effects.TransmissionRipple('elbow_joint', 1e-4, 300.0, 0.3)
+    model = ProgramModel(ur5, (wave,))
+    start = wt.forward(ur5, START)
+    many = [moved(start, 0.1 * share, 0.1 * share, 0.0) for share in np.linspace(0.0, 1.0, 51)[1:]]
+    told = []
+    for points in ([many[-1]], many):
+        moves = [Move('linear', use(k + 1), EYE) for k in range(len(points))]
+        program = MoveProgram((START, *points), ((Move('joint', use(0), EYE), *moves),))
+        found = correct_program(model, program)
+        off = np.linalg.norm(np.concatenate(found.before)[:, :3], axis=1)
+        told.append((off.max(), np.sqrt(np.average(off**2, weights=np.concatenate(found.ways)))))
+    np.testing.assert_allclose(told[0], told[1], rtol=0.01)

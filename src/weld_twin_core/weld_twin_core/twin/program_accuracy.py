@@ -121,7 +121,7 @@ def _drawn(
 
 def along_seams(result: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
     """Return the accuracy along corrected seams, before and after; of all moves without any."""
-    pieces = result.travel.pieces
+    pieces = result.looks
     ways = [_along(result, k) for k in range(len(pieces))]
     if not any(way.any() for way in ways):
         ways = [_ends(piece.motion.t.size, piece.ends) for piece in pieces]
@@ -139,7 +139,7 @@ def along_seams(result: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | 
 
 def _along(result: ProgramCorrection, k: int) -> Array:
     """Return how much of the way along corrected seams the samples of a piece stand for, (N,) [m]."""
-    piece = result.travel.pieces[k]
+    piece = result.looks[k]
     seams = [move.kind != 'joint' and move.seam not in result.left for move in piece.moves]
     steps = np.where(np.array(seams, dtype=bool)[piece.move], result.ways[k], 0.0)
     # A seam begins where the move before it ends.

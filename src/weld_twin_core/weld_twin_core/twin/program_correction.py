@@ -28,7 +28,7 @@ from ..arrays import Array
 from ..errors import DataError, PathError
 from ..motion.inverse.newton import least_step
 from ..motion.programs import Move, MoveProgram, Piece, Travel, Use, travel
-from ..motion.programs.travel import repeated, unrelenting
+from ..motion.programs.travel import finer, refined, repeated, unrelenting
 from ..recording import JointMotion
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
@@ -44,6 +44,10 @@ BETTER = 0.8
 came out farther off than before, up to twice as far."""
 NOTHING = 1e-9
 """Error [m] that is rounding."""
+_PARTS, _LOOKS = 10, 20_000
+"""Parts of a step between two samples that is looked at for what is expected: of a centimetre of a
+seam each millimetre, for play turns around in a few of them. Fewer of programs that would take more
+looks than that, a matrix of them and all models drawn being 64 MB."""
 _WORTH = 0.5
 """Share of a correction that must be trusted: below it the doubt is larger than the correction."""
 
@@ -98,14 +102,14 @@ class ProgramCorrection:
     """Seams that were corrected without play, friction and lag, with the reason."""
     held: frozenset[int]
     """Points that were not moved."""
+    looks: tuple[Piece, ...]
+    """The same motion at finer steps: what is expected is of these samples."""
     before: tuple[Array, ...]
     after: tuple[Array, ...]
-    """What is missing to the real tool at every sample of every piece, with what no program mends,
+    """What is missing to the real tool at every look of every piece, with what no program mends,
     shape (N, 6) [m, rad]."""
     ways: tuple[Array, ...]
-    """How far the tool goes to every sample, shape (N,) [m]."""
-    covariances: tuple[Array | None, ...]
-    """In the set-up that was recorded, shape (N, 6, 6)."""
+    """How far the tool goes to every look, shape (N,) [m]."""
     drawn: tuple[Drawn | None, ...]
     results: tuple[_MoveResult, ...]
     """One for every move, in the order of the program."""
@@ -280,43 +284,46 @@ class _Work(NamedTuple):
         self, moved: MoveProgram, remaining: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
         """Return the correction with everything reported about it."""
-        before, after, ways, sure, drawn = [], [], [], [], []
-        for piece in self.travel.pieces:
-            aim = self.model.wanted(piece)
-            motion = repeated(self.model.robot, moved, piece)
-            before.append(missing(aim, self.model.real(piece, piece.motion, whole=True)))
-            after.append(missing(aim, self.model.real(piece, motion, whole=True)))
+        before, after, ways, drawn = [], [], [], []
+        samples = sum(piece.motion.t.size for piece in self.travel.pieces)
+        parts = int(np.clip(_LOOKS // max(samples, 1), 1, _PARTS))
+        looks = tuple(refined(piece, parts) for piece in self.travel.pieces)
+        for piece, look in zip(self.travel.pieces, looks, strict=True):
+            aim = self.model.wanted(look)
+            motion = finer(repeated(self.model.robot, moved, piece), parts)
+            before.append(missing(aim, self.model.real(look, look.motion, whole=True)))
+            after.append(missing(aim, self.model.real(look, motion, whole=True)))
             steps = np.diff(aim[:, :3, 3], axis=0, prepend=aim[:1, :3, 3])
             ways.append(np.linalg.norm(steps, axis=1))
-            sure.append(self.model.covariances(piece, piece.motion))
-            drawn.append(self.model.drawn(piece, piece.motion))
+            drawn.append(self.model.drawn(look, look.motion))
         return ProgramCorrection(
             moved,
             self.travel,
             remaining,
             calm,
             frozenset(_spread(self.program, remaining)),
+            looks,
             tuple(before),
             tuple(after),
             tuple(ways),
-            tuple(sure),
             tuple(drawn),
-            self._results(moved, before, after, sure),
+            self._results(moved, looks, before, after),
         )
 
     def _results(
         self,
         moved: MoveProgram,
-        before: list[Array],
-        after: list[Array],
-        sure: list[Array | None],
+        looks: Sequence[Piece],
+        before: Sequence[Array],
+        after: Sequence[Array],
     ) -> tuple[_MoveResult, ...]:
         seen: dict[int, tuple[float, float, str, float | None]] = {}
         for k, piece in enumerate(self.travel.pieces):
-            outside, spread = _outside(self.model, piece), sure[k]
+            outside = _outside(self.model, piece)
+            spread = self.model.covariances(piece, piece.motion)
             sigma = None if spread is None else largest_sigma(spread[piece.ends])
             for m, move in enumerate(piece.moves):
-                ends = (gaps[k][piece.ends[m], :3] for gaps in (before, after))
+                ends = (gaps[k][looks[k].ends[m], :3] for gaps in (before, after))
                 first, then = (float(np.linalg.norm(end)) for end in ends)
                 doubt = None if sigma is None else float(sigma[m])
                 seen[id(move)] = first, then, outside.get(m, ''), doubt

@@ -53,9 +53,12 @@ def test_a_plain_controller_tells_when_its_moves_end_and_where_it_believes_the_t
     places = [first + _shift(0.0, 0.1, 0.0), first + _shift(0.05, 0.1, 0.0)]
     moves = [('movej', [start]), *(('movel', [place]) for place in places)]
     made = driven(robot, moves, start, 0.02)
-    np.testing.assert_allclose(made.ends, [0.0, 5.0, 7.5], atol=1e-6)
+    np.testing.assert_allclose(made.ends, [0.0, 5.1, 7.7], atol=1e-6)
     wanted = first[:3, 3] + np.array([[0.0, 0.05, 0.0], [0.025, 0.1, 0.0]])
-    np.testing.assert_allclose(made.believed(np.array([2.5, 6.25])), wanted, atol=1e-7)
+    np.testing.assert_allclose(made.believed(np.array([2.6, 6.35])), wanted, atol=1e-5)
+    # No arm has its speed at once: what its joints give would throw the tool off.
+    speed = np.linalg.norm(np.diff(made.tool, axis=0), axis=1) / np.diff(made.clock)
+    assert max(speed[0], speed[-1], np.abs(np.diff(speed)).max()) < 0.0015
 
 
 def _shift(*way):

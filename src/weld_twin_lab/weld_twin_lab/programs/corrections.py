@@ -143,14 +143,19 @@ def _off(seam: SealedSeam, text: str, meant: Driven) -> tuple[float, float]:
     t, q = evenly(along, RATE)
     keep = (t >= REST) & (t <= REST + along.clock[-1])
     at = t[keep] - REST
-    moved = (along.believed(along.ends) - meant.believed(meant.ends)).T
+    moved = along.believed(along.ends) - meant.believed(meant.ends)
+    # Points are moved, and what lies between them by its share of the way.
+    ends = np.interp(along.ends, along.clock, along.way)
+    moved = np.stack([np.interp(along.way, ends, by) for by in moved.T], axis=1)
     # Between the places it works out, a controller turns its joints evenly: the tool goes in a bow.
     tool = np.array(seam.robot.T_flange_tool)
     believed = np.array([tool_pose(seam.robot, row, tool)[:3, 3] for row in q[keep]])
-    wanted = believed - np.stack([np.interp(at, along.ends, m) for m in moved], axis=1)
+    wanted = believed - np.stack([np.interp(at, along.clock, by) for by in moved.T], axis=1)
     real = (seam.ran(t, q).position[keep] - base[:3, 3]) @ base[:3, :3]
     off = np.linalg.norm(real - wanted, axis=1)
-    return float(np.sqrt((off**2).mean())), float(off.max())
+    # What is promised is of the way, and not of the time that it takes.
+    way = np.gradient(np.interp(at, along.clock, along.way))
+    return float(np.sqrt(np.average(off**2, weights=way))), float(off.max())
 
 
 def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:

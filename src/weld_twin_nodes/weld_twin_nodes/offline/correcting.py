@@ -379,7 +379,7 @@ def _postures_more(
         surer = replace(
             model, posterior=model.posterior.after(Features(twin, still, t), noise), _twins={}
         )
-        drawn = tuple(surer.drawn(piece, piece.motion) for piece in made.correction.travel.pieces)
+        drawn = tuple(surer.drawn(look, look.motion) for look in made.correction.looks)
         _, after = along_seams(replace(made.correction, drawn=drawn))
         if after is not None and (after.within(tolerance) or 0.0) >= SURE:
             return number

@@ -418,8 +418,9 @@ class _Way:
 
     def carried_out(self) -> list[str]:
         """Return that the motion was not that of the corrected program; nothing where it was."""
-        moved = float(np.sqrt((self.shift[self.near] ** 2).sum(axis=1).mean()))
-        off = float(np.sqrt((self.away[self.near] ** 2).mean()))
+        # Usual ones: moves that lead to the way and from it come near it as well.
+        moved = float(np.median(np.linalg.norm(self.shift[self.near], axis=1)))
+        off = float(np.median(self.away[self.near]))
         if moved < LEAST_MOVED or off < NOT_RUN * moved:
             return []
         return [

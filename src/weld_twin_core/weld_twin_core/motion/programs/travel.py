@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from ...arm.chain import forward
 from ...arm.robot import Robot
@@ -47,8 +48,9 @@ _STANDS = (
 )
 _LEAST_TIME = 0.02
 """Shortest time [s] of a move."""
-_SLOW = 0.15
-"""Share of a move's way over which it speeds up from a stop: a judgement."""
+_RISE = 0.2
+"""Time from a stop to full speed [s], while which speed rises evenly: a judgement, torches reach some
+centimetres a second within a few tenths."""
 
 
 class Piece(NamedTuple):
@@ -318,19 +320,16 @@ def _joined(done: Sequence[tuple[Move, _Reached]]) -> Piece:
 
 
 def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
-    """Return the times of samples at even shares of the way, slower near a stop."""
-    if t.size < 2:
-        return t
-    share = np.linspace(0.0, 1.0, t.size)
-    late = from_rest * _late(share) + to_rest * (_late(np.ones(1)) - _late(1.0 - share))
-    return np.asarray(t[-1] * (share + late))
+    """Return the times of samples that full speed would pass at times (K,), slower near a stop."""
+    whole = t[-1]
+    rise = min(_RISE, float(whole))
+    late = from_rest * _late(t, rise) + to_rest * (0.5 * rise - _late(whole - t, rise))
+    return np.asarray(t + late)
 
 
-def _late(share: Array) -> Array:
-    """Return how much later a place is reached, its share of the way from a stop, than at full speed."""
-    # The speed rises from a tenth along the way; half a sine there is speed rising evenly enough.
-    near = np.minimum(share / _SLOW, 0.9)
-    return np.asarray(_SLOW * (np.log1p(10.0 * near) - near))
+def _late(t: Array, rise: float) -> Array:
+    """Return how much later a place is reached from a stop than at full speed, which takes t [s]."""
+    return np.where(t < 0.5 * rise, np.sqrt(2.0 * rise * t) - t, 0.5 * rise)
 
 
 def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
@@ -356,6 +355,36 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
         q[first : first + way] = part
         q[first + way : last + 1] = part[-1]
     return JointMotion(piece.motion.t, q)
+
+
+def refined(piece: Piece, parts: int) -> Piece:
+    """Return a piece with every step between its samples cut into so many."""
+    return piece._replace(
+        motion=finer(piece.motion, parts),
+        move=np.repeat(piece.move, parts)[parts - 1 :],
+        ends=piece.ends * parts,
+        vias=np.where(piece.vias < 0, -1, piece.vias * parts),
+    )
+
+
+def finer(motion: JointMotion, parts: int) -> JointMotion:
+    """
+    Return a motion with every step between its samples cut into so many.
+
+    Joints go as smoothly as they may without turning around between two samples [1]_: straight pieces
+    would have all of their acceleration at the samples.
+
+    References
+    ----------
+    .. [1] F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic
+       interpolants", SIAM Journal on Scientific and Statistical Computing 5, 1984.
+
+    """
+    count = motion.t.size
+    if count < 2:
+        return motion
+    t = np.interp(np.arange((count - 1) * parts + 1) / parts, np.arange(count), motion.t)
+    return JointMotion(t, PchipInterpolator(motion.t, motion.q)(t))
 
 
 def unrelenting(piece: Piece, motion: JointMotion) -> JointMotion:

@@ -318,6 +318,37 @@ def test_a_frame_that_not_every_way_sets_is_not_known_after_it(language, parts, 
     assert [move.kind != 'unknown' for move in moves] == known
 
 
+KRL_SETS = f'DEF sub()\nother()\nEND\nDEF other()\n{KRL_SHORT}END\n'
+UR_SETS = f'def sub():\n{UR_SHORT}end\n'
+RAPID_SEAM = (
+    'MODULE m\n'
+    'CONST robtarget p1 := [[900,0,800],[0.7,0,0.714,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
+    'CONST robtarget p2 := [[0,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
+    'PROC main()\nsub;\nMoveL p1,v100,fine,tool0;\nENDPROC\nPROC sub()\n{}ENDPROC\nENDMODULE\n'
+)
+
+
+@pytest.mark.parametrize(
+    ('language', 'text', 'reason'),
+    [
+        ('krl', f'DEF a()\n{KRL_LONG}sub()\n{KRL_SEAM}END\n{KRL_SETS}', 'other routines'),
+        ('krl', f'DEF a()\n{KRL_LONG}sub()\n{KRL_LONG}{KRL_SEAM}END\n{KRL_SETS}', ''),
+        ('krl', f'DEF a()\n{KRL_SHORT}sub()\n{KRL_SEAM}END\n{KRL_SETS}', ''),
+        ('krl', f'DEF a()\n{KRL_LONG}up:\n{KRL_SEAM}{KRL_SHORT}GOTO up\nEND\n', 'other routines'),
+        ('krl', f'DEF a()\n{KRL_LONG}up:\n{KRL_SEAM}GOTO up\nEND\n', ''),
+        ('urscript', f'def a():\n{UR_SETS}{UR_LONG}sub()\n{UR_SEAM}end\n', 'other routines'),
+        ('urscript', f'def a():\n{UR_SETS}{UR_LONG}{UR_SEAM}sub()\nend\n', ''),
+        ('rapid', RAPID_SEAM.format('PDispSet x;\n'), 'sub, called at'),
+        ('rapid', RAPID_SEAM.format('PDispSet x;\nMoveL p2,v9,fine,tool0;\nPDispOff;\n'), ''),
+    ],
+)
+def test_what_a_routine_sets_holds_after_its_call(language, text, reason):
+    robot = PROGRAMS[language][0]
+    own = context(robot, language).controller
+    move = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces[0][0]
+    assert (move.kind == 'unknown') == bool(reason) and reason in move.why
+
+
 def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     source = (MADE / 'bracket.mod').read_text().replace('[TRUE, [[0,0,250]', '[FALSE, [[0,0,250]')
     robot = wt.load('abb_irb1600')

@@ -72,6 +72,19 @@ MOVING = Frame('')
 _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
 _ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
+_NAMED = re.compile(
+    r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEFFCT[ \t]+\w+|DEF)[ \t]+(\w+)[ \t]*\([^\r\n]*', re.I | re.M
+)
+_CALL = r'(?<![\w$.])(?<!DEF )(?<!DEF\t){}[ \t]*\('
+_SETS = {
+    what: re.compile(
+        rf'^[ \t]*(?:\${what}(?:\.\w+)?[ \t]*=|FDAT_ACT[ \t]*=|BAS[ \t]*\([ \t]*#(?:EX_)?{what}\b)',
+        re.I | re.M,
+    )
+    for what in ('TOOL', 'BASE')
+}
+"""What sets tool or base."""
+_GOTO, _LABEL = r'^[^\r\n]*\bGOTO[ \t]+(\w+)', r'^[ \t]*(\w+)[ \t]*:(?!=)'
 _WITH = re.compile(r'\bWITH\b', re.I)
 _ALONG = re.compile(
     r'EK[ \t]*\([ \t]*MACHINE_DEF\[[ \t]*(\w+)[ \t]*\]\.ROOT[ \t]*,'
@@ -132,6 +145,14 @@ class KrlReader(Reader):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)
         self._frame_tables()
+        heads = list(_NAMED.finditer(self.text))
+        ends = [*(head.start() for head in heads[1:]), len(self.text)]
+        routines = [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
+        aims = {match[1].lower() for match in re.finditer(_GOTO, self.text, re.I | re.M)}
+        labels = [m for m in re.finditer(_LABEL, self.text, re.M) if m[1].lower() in aims]
+        tool, base = (
+            [*labels, *self.calls(routines, sets.search, _CALL)] for sets in _SETS.values()
+        )
         self.in_order(
             {
                 _MOVE: self._move,
@@ -141,7 +162,11 @@ class KrlReader(Reader):
                 _WAIT: lambda match: self.dwell(match.span(1)),
                 _ROUTINE: self._routine,
                 _BLOCK: self._block,
-            }
+            },
+            more=[
+                (lambda _: setattr(self.state, 'tool', OTHER_TOOL), tool),
+                (lambda _: setattr(self.state, 'base', OTHER_BASE), base),
+            ],
         )
         self.settle(OTHER_TOOL, self.tools, tool=True)
         self.settle(OTHER_BASE, self.bases, tool=False)

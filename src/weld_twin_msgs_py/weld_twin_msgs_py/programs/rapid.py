@@ -68,6 +68,8 @@ _ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.(?!tload\b)
 _DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)\b', re.I | re.M)
+_NAMED = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+(\w+)', re.I | re.M)
+_CALLED = r'(?:^|(?<=;))[ \t]*({})\b(?!\s*:=)'
 _CONF = re.compile(r'\bConf([JL])\s*\\(On|Off)\b', re.I)
 _KINDS: dict[str, Kind] = {'absj': 'joint', 'j': 'joint', 'l': 'linear', 'c': 'circular'}
 
@@ -103,6 +105,10 @@ class RapidReader(Reader):
         self.again = self.set_again(_ASSIGNED)
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
+        heads = list(_NAMED.finditer(self.text))
+        ends = [*(head.start() for head in heads[1:]), len(self.text)]
+        routines = [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
+        displacing = self.calls(routines, _displaces, _CALLED)
         self.in_order(
             {
                 _MOVE: self._move,
@@ -111,7 +117,8 @@ class RapidReader(Reader):
                 _CONF: self._conf,
                 _CALL: self._call,
                 _ROUTINE: self.new_piece,
-            }
+            },
+            more=[(self._displacing, displacing)],
         )
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
         return self.program
@@ -248,6 +255,9 @@ class RapidReader(Reader):
             self.displaced = f'{result[1]} at {where} displaces it'
         else:
             self.unknown('linear', result, f'{result[1]} is not understood')
+
+    def _displacing(self, result: re.Match[str]) -> None:
+        self.displaced = f'{result[1]}, called at {self.where(result, 1)}, displaces it'
 
     def _call(self, result: re.Match[str]) -> None:
         """Take an instruction that nobody knows for a move if it is handed what moves need."""
@@ -388,3 +398,10 @@ class RapidReader(Reader):
             # Of a joint move the speed is the tool's too; 1 m/s is near a tenth of full speed.
             value = float(np.clip(value / 10.0, 0.01, 1.0))
         return max(value, LEAST_SPEED), zone == 'fine'
+
+
+def _displaces(text: str) -> bool:
+    """Return whether points are displaced after a routine, by its text."""
+    words = [result[1].lower() for result in _OTHER.finditer(text)]
+    last = next((word for word in reversed(words) if word[:5] in ('pdisp', 'eoffs')), '')
+    return last in _DISPLACED

@@ -49,17 +49,41 @@ class Reader(ABC):
         """
 
     def in_order(
-        self, handlers: dict[re.Pattern[str], Handler], start: int = 0, end: int | None = None
+        self,
+        handlers: dict[re.Pattern[str], Handler],
+        start: int = 0,
+        end: int | None = None,
+        more: Sequence[tuple[Handler, Sequence[re.Match[str]]]] = (),
     ) -> None:
-        """Hand what patterns find in the text to their handlers, as it stands there."""
+        """Hand what patterns find in the text, and what was found, to handlers, as it stands there."""
         stop = len(self.text) if end is None else end
         matches = [
             (match.start(), handle, match)
             for pattern, handle in handlers.items()
             for match in pattern.finditer(self.text, start, stop)
         ]
+        matches += [(match.start(), handle, match) for handle, found in more for match in found]
         for _, handle, match in sorted(matches, key=lambda each: each[0]):
             handle(match)
+
+    def calls(
+        self, routines: Sequence[tuple[str, Span]], does: Callable[[str], object], call: str
+    ) -> list[re.Match[str]]:
+        """
+        Return the calls of routines of this file that do something, or call one that does.
+
+        routines: their names, and where their statements stand. does: takes their text. call: a
+        pattern of calls, with {} for names.
+        """
+        names = {name.lower() for name, span in routines if does(self.text[slice(*span)])}
+        while names:
+            listed = '|'.join(map(re.escape, sorted(names)))
+            pattern = re.compile(call.replace('{}', f'(?:{listed})'), re.I | re.M)
+            more = {name.lower() for name, span in routines if pattern.search(self.text, *span)}
+            if more <= names:
+                return list(pattern.finditer(self.text))
+            names |= more
+        return []
 
     def set_again(self, pattern: re.Pattern[str]) -> dict[str, str]:
         """

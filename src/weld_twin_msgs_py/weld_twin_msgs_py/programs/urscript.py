@@ -28,7 +28,7 @@ from .blocks import Blocks, unclear
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .context import Context
 from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .reader import LEAST_SPEED, Reader, Span
 from .source import UR_POSE, Notation, Number, Source, closing, stripped
 
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
@@ -53,6 +53,7 @@ _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'
     r'(?:(if|while|for)|(elif|else)|(end))\b)'
 )
+_NAME, _CALL = re.compile(r'\s*(\w+)'), r'(?<![\w.])(?<!def )(?<!thread ){}\s*\('
 _ASSIGNED = re.compile(
     r'(?:^|(?<=;))[ \t]*(?:(?:global|local)[ \t]+)?([A-Za-z_]\w*)((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)'
     r'[ \t]*',
@@ -76,8 +77,12 @@ class UrscriptReader(Reader):
         self._declare()
         routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
         blocks, ways = Blocks(self.program, (unclear('set_tcp'),)), list[str]()
-        for result in _WORD.finditer(self.text):
-            if result[5]:
+        calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
+        words = [*_WORD.finditer(self.text), *calls]
+        for result in sorted(words, key=lambda each: each.start()):
+            if result.re is not _WORD:
+                self.tool = OTHER_TOOL
+            elif result[5]:
                 self._statement(result)
             elif result[6]:
                 routines.append(self.tool)
@@ -103,6 +108,18 @@ class UrscriptReader(Reader):
             if name in self.names:
                 self.program.hold(self.names[name], f'{name} is set anew at {where}')
         return self.program
+
+    def _routines(self) -> list[tuple[str, Span]]:
+        """Return names and statements of the routines; of one that holds others, all of it."""
+        out, begun = list[tuple[str, Span]](), list[re.Match[str] | None]()
+        for result in _WORD.finditer(self.text):
+            if result[6]:
+                begun.append(_NAME.match(self.text, result.end()))
+            elif result[7]:
+                begun.append(None)
+            elif result[9] and begun and (head := begun.pop()) is not None:
+                out.append((head[1], (head.end(), result.start())))
+        return out
 
     def _declare(self) -> None:
         """Take in the variables that are set to a pose or to joint positions."""

@@ -287,6 +287,17 @@ def test_an_axis_that_would_pass_where_a_flag_changes_is_left(
     assert ('axis 6 would pass an angle at which the flags' in said.out) == left, said.out
 
 
+def test_the_start_is_given_as_the_pendant_shows_it(tmp_path):
+    # FANUC counts J3 from the ground: with J2 at 15 degrees, 260 is beyond the 264 of the joint.
+    text = (MADE / 'bracket.ls').read_text().replace('   4:J P[1:home] 20% FINE    ;\n', '')
+    more = ('--tool', '1=0,0,250,0,0,0', '--start')
+    how = {'name': 'p.ls', 'robot': 'fanuc_m10ia'}
+    said = corrected(tmp_path, text, *more, '8,15,260,4,-75,-6', **how)
+    assert said.code == 2 and "'joint_3' is at 4.79966" in said.err
+    said = corrected(tmp_path, text, *more, '8,15,-10,4,-75,-6', **how)
+    assert said.code == 0, said.err
+
+
 def test_a_point_that_the_program_changes_itself_is_left(tmp_path):
     text = SEAM.replace('def seam():', 'def seam():\n  P = p[-0.52, -0.20, 0.25, 2.12, 2.31, 0.0]')
     text = text.replace('movel(p[-0.52, -0.20, 0.25, 2.12, 2.31, 0.0]', 'P[2] = 0.3\n  movel(P')

@@ -193,16 +193,24 @@ class Given(argparse.Namespace):
             counted = counted_of(diagnosis_of(model).get('model') or {}, robot)
         return Context(robot, controller_of(robot, language, tools, bases, cell), pulses, counted)
 
-    def read_start(self, robot: Robot) -> Array | None:
-        """Return the joint positions of --start, degrees as written, in the model's units."""
+    def read_start(self, context: Context) -> Array | None:
+        """
+        Return the joint positions of --start, shape (n,) [rad or m].
+
+        They are given as the controller shows them; beside external axes as the robot file has them.
+        """
         import numpy as np
 
+        robot = context.robot
         if not self.start:
             return None
         values = np.array(_numbers(self.start, '--start'))
         if values.size != robot.n:
             raise DataError(f'--start needs {robot.n} joint positions, got {values.size}')
-        q = np.where(robot.prismatic, values * 1e-3, np.radians(values))
+        if context.controller.external:
+            q = np.where(robot.prismatic, values * 1e-3, np.radians(values))
+        else:
+            q = context.degrees().value(values.tolist())
         robot.check_positions(q)
         return np.asarray(q)
 

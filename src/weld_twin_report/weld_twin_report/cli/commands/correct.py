@@ -119,7 +119,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     model = correcting.program_model(robot, given.model, given.temperature, setup)
     content = diagnosis_of(given.model)
     made = correcting.corrected_program(
-        program, context, model, caps, given.read_start(robot), other_readings(content)
+        program, context, model, caps, given.read_start(context), other_readings(content)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content)

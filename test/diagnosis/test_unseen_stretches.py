@@ -130,6 +130,7 @@ def test_a_staircase_that_stations_chose_says_nothing_of_those_that_did_not(seed
     assert unseen.rms(found.residual) < 0.95 * unseen.rms(unseen.bare)
     assert unseen.rms(unseen.whole) > 0.98 * unseen.rms(unseen.bare)
     assert unseen.wandered()[0] > 100.0
+    assert unseen.missed().min() < 0.0, 'some part is predicted better without it'
 
 
 @pytest.mark.parametrize('static', [True, False])
@@ -142,6 +143,7 @@ def test_a_true_staircase_is_chosen_again_without_any_stretch(static):
     unseen = Unseen.of(problem, scale, found, np.zeros(0))
     assert unseen.rms(unseen.whole) == pytest.approx(unseen.rms(found.residual), rel=1e-9)
     assert unseen.wandered()[0] < 1.0
+    assert unseen.missed().min() > 0.5, 'every part is predicted worse without it'
 
 
 def test_a_model_without_frames_and_effects_predicts_its_target():

@@ -59,13 +59,12 @@ def test_what_is_told_is_held_against_what_is_told_alone(row):
     assert told[0][1].median > alone[0][1].median, 'with the zero told, less is left beside'
 
 
-def test_belief_learns_from_kinds_that_were_believed_too_little():
+@pytest.mark.parametrize('name', ['name', 'name of many'])
+def test_belief_learns_from_names_that_were_believed_too_little(name):
     named = reported_claims({'causes': CAUSES}, least=0.0)
     assert [claim['kinds'] for claim in reported_claims({'causes': CAUSES})] == [['link_twist']]
     for claim in named:
         claim['against_told'] = {'out': claim['kinds'] == ['joint_offset']}
-    said = [
-        Statement('name of many', k, {'left': 0.6}, c['probability']) for k, c in enumerate(CAUSES)
-    ]
+    said = [Statement(name, k, {'left': 0.6}, c['probability']) for k, c in enumerate(CAUSES)]
     learned = _examples(SimpleNamespace(statements=said), CAUSES, named)
     assert [(right, told) for _, _, right, told, _ in learned] == [(False, 0.9), (True, 0.33)]

@@ -62,6 +62,8 @@ TERMS: dict[str, dict[str, int]] = {
         'size': 1,
         'faint beside others': -1,
         'wander over size': -1,
+        'growth': 1,
+        'least growth': 1,
         'left at its joint': -1,
         'constant': 0,
         'angle': 0,

@@ -18,6 +18,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
+from ..belief.learning import NAMES
 from ..blind.displacement import rms
 from ..study import tabled
 from .borne_out import Borne, borne_out
@@ -75,7 +76,7 @@ def _examples(
     diagnosis: Diagnosis, causes: Sequence[Mapping[str, Any]], claims: Sequence[Mapping[str, Any]]
 ) -> list[list[Any]]:
     """
-    Return every statement that a kind of many small errors is there, for belief to be learned.
+    Return every statement that a name is right, for belief to be learned.
 
     Of those believed too little to be reported, too: learned from the others alone, belief would
     only ever fall.
@@ -84,7 +85,7 @@ def _examples(
     """
     out = []
     for said in map(vars, diagnosis.statements):
-        if said['kind'] == 'name of many':
+        if said['kind'] in NAMES:
             kinds = {kind for kind, _, _ in causes[said['cause']]['names']}
             own = [claim for claim in claims if kinds == set(claim['kinds'])]
             if own:

@@ -70,9 +70,11 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
     if evidence.families is not None:
         return Stated(table, (), None, situation, evidence.floor)
     sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
-    each = list(zip(table, sizes, evidence.wandered, strict=False))
-    on = evidence.structure.depends_on
-    every = [of_name(row, size, wandered, len(each) - 1, on) for row, size, wandered in each]
+    each = list(zip(table, sizes, evidence.wandered, evidence.missed, strict=False))
+    on, others = evidence.structure.depends_on, len(each) - 1
+    every = [
+        of_name(row, size, wandered, missed, others, on) for row, size, wandered, missed in each
+    ]
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
         return Stated(table, (), None, situation, evidence.floor)

@@ -88,13 +88,19 @@ def hardly_a_gap(gap: float, structure: float) -> float:
 
 
 def of_name(
-    row: Row, size: float, wandered: float, others: int = 0, left_at: Sequence[str] = ()
+    row: Row,
+    size: float,
+    wandered: float,
+    missed: Sequence[float],
+    others: int = 0,
+    left_at: Sequence[str] = (),
 ) -> Numbers:
     """
     Return the features of the name of an effect found, from its row of the table of answers.
 
     size: how far the effect moves the tool, RMS in units of noise.
     wandered: how far its values move from stretch to stretch, over what noise makes them.
+    missed: by what share the error of every part left out grows without it.
     others: how many effects were found beside it.
     left_at: what the most of what is left depends on, in words.
     """
@@ -107,6 +113,7 @@ def of_name(
             'size': log(size),
             'wander': log(wandered),
             'wander over size': log(wandered) - log(size),
+            **of_missed(missed),
             'members': len(row.listed),
             'faint beside others': faint(log(size), others),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
@@ -115,6 +122,12 @@ def of_name(
             f'{ONLY}{row.leader.site.effect}': float(len(row.listed) == 1),
         }
     )
+
+
+def of_missed(growths: Sequence[float]) -> Numbers:
+    """Return by how much unseen parts get worse without a name, in the median and at the least."""
+    median = float(np.median(growths)) if len(growths) else 0.0
+    return {'growth': log1(median), 'least growth': log1(min(growths, default=0.0))}
 
 
 def of_level(row: Row, level: str) -> Numbers:
@@ -156,8 +169,7 @@ def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
     """
     return plain(
         {
-            'growth': log1(family.growth),
-            'least growth': log1(min(family.growths, default=0.0)),
+            **of_missed(family.growths),
             'size': log(family.rms_m / max(floor, 1e-12)),
             'members': len(cause.name),
             'kinds': kinds,

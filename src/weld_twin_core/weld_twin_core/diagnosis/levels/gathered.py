@@ -61,6 +61,7 @@ def gathered(
         leverage=_leverage(unseen, floor),
         sizes=tuple(unseen.rms(part) for part in parts),
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
+        missed=() if result.dense else tuple(tuple(each) for each in unseen.missed().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
         strays=_named(recordings, result.scale.left_out),

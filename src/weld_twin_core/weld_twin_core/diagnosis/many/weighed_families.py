@@ -29,12 +29,10 @@ from ..beliefs import Beliefs
 from ..hypotheses.any_motion import same_error
 from ..hypotheses.search import Search
 from ..result import Family, Site
-from ..unseen.folds import STRETCHES
+from ..unseen.folds import TINY, growth, parts_of
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import believed
 
-TINY = 1e-9
-"""Least error [m] divided by: a nanometre, far below any instrument."""
 MOST_LIKE = 2
 """Kinds reported beside one at the most; what more than three would explain is no name."""
 
@@ -86,14 +84,9 @@ class _Case:
         usual = believed(model)
         usual = np.where(usual > 0.0, usual, result.precision)
         views = unseen.held(usual, result.final.coordinates).every_way()
-        parts, first = [], 0
-        for view in views:
-            names, own = np.unique(view.trusted_labels(), return_inverse=True)
-            # Of eight parts two neighbours together tell more steadily.
-            parts.append(first + (own // 2 if names.size >= STRETCHES else own))
-            first = int(parts[-1].max()) + 1
+        parts = parts_of([view.trusted_labels() for view in views])
         where = model.robot, result.problem.align
-        return cls(*where, model.found, tuple(views), np.concatenate(parts), worth)
+        return cls(*where, model.found, tuple(views), parts, worth)
 
     @cached_property
     def sites(self) -> list[Site]:
@@ -136,12 +129,7 @@ class _Case:
 
     def growth(self, kept: Iterable[int], less: Iterable[int]) -> Array:
         """Return by what share the error of every part grows to a lesser model, chance aside."""
-        out = self.left(less) / np.maximum(self.left(kept), TINY) - 1.0
-        more = self.squares(less) - self.squares(kept)
-        mean = self._mean(more)
-        spread = self._mean((more - mean[self.parts]) ** 2)
-        error = np.sqrt(spread / np.maximum(np.bincount(self.parts) - 1, 1))
-        return np.where((out < 0.0) & (mean > -error), 0.0, out)
+        return growth(self.squares(kept), self.squares(less), self.parts)
 
     def _mean(self, values: Array) -> Array:
         return np.bincount(self.parts, weights=values) / np.bincount(self.parts)

@@ -11,15 +11,18 @@ alike, so that it is parts that are counted wherever an error is reported.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.problem import PLACES, Problem
 
 STRETCHES = 8
 """Folds in time: enough for a standard error, few enough that each shows much."""
+TINY = 1e-9
+"""Least error [m] divided by: a nanometre, far below any instrument."""
 MOST_IN_ONE = 0.5
 """Share of a recording in one region from which on the others do not show its base."""
 
@@ -112,7 +115,7 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     return Gain((was - remaining) / max(was, 1e-300), steadiness(one, two), remaining**0.5)
 
 
-def _means(values: Array, labels: Array) -> Array:
+def _means(values: Array, labels: NDArray[Any]) -> Array:
     """Return the mean of every part, by its number; those of parts that are not there mean nothing."""
     return np.asarray(np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))
 
@@ -122,6 +125,36 @@ def steadiness(before: Array, after: Array) -> float:
     fall = before - after
     error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
     return float(fall.mean() / max(error, 1e-300))
+
+
+def parts_of(labels: Sequence[Array]) -> NDArray[np.intp]:
+    """
+    Return the part of every sample, those of all ways to divide one after the other.
+
+    Of eight parts two neighbours together tell more steadily.
+
+    labels: part of every sample, an array for each way to divide the samples.
+    """
+    parts, first = [], 0
+    for each in labels:
+        names, own = np.unique(each, return_inverse=True)
+        parts.append(first + (own // 2 if names.size >= STRETCHES else own))
+        first = int(parts[-1].max()) + 1
+    return np.concatenate(parts)
+
+
+def growth(before: Array, after: Array, parts: NDArray[np.intp]) -> Array:
+    """
+    Return by what share the RMS error of every part grows, chance aside, shape (parts,).
+
+    before, after: squared errors, shape (samples,) [m^2].
+    parts: of every sample, shape (samples,).
+    """
+    was, now, mean = (_means(values, parts) for values in (before, after, after - before))
+    out = np.sqrt(now) / np.maximum(np.sqrt(was), TINY) - 1.0
+    spread = _means((after - before - mean[parts]) ** 2, parts)
+    error = np.sqrt(spread / np.maximum(np.bincount(parts) - 1, 1))
+    return np.where((out < 0.0) & (mean > -error), 0.0, out)
 
 
 def jackknife(tries: Array) -> Array:

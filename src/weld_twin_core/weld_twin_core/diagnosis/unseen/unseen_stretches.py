@@ -32,7 +32,7 @@ from ..algebra.definite import Index, factored, inverted, unit_diagonal
 from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.starts import chosen_anew
-from .folds import STRETCHES, Gain, gain, ways_to_divide
+from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
 DAMPING = 1e-11
 """Of columns that repeat others, far below what a fit can tell."""
@@ -356,6 +356,21 @@ class Unseen:
         for k, moved in self._anew.items():
             out[k] = min((len(moved) - 1) * self._beside(moved).mean(), MOST_STEPS)
         return out
+
+    def missed(self) -> Array:
+        """
+        Return by what share the error of every part grows without each effect, shape (K, parts).
+
+        Parts of every way to divide the data, all other effects and the frames fitted anew.
+        """
+        ways, every = self.every_way(), range(len(self.parts))
+        parts = parts_of([each.trusted_labels() for each in ways])
+
+        def left(kept: Sequence[int]) -> Array:
+            return np.concatenate([each.squares(each.predict(kept)) for each in ways])
+
+        whole, less = left(every), ([k for k in every if k != out] for out in every)
+        return np.array([growth(whole, left(kept), parts) for kept in less])
 
     def _beside(self, rows: Array) -> Array:
         """Return the squares of rows, (R, rows), that no column of the model can take up, (R,)."""

@@ -66,6 +66,9 @@ class Evidence:
     wandered: tuple[float, ...] = ()
     """How far the values of every effect move from fold to fold, over what noise makes them: a
     formula that stands in for another wants other values in every fold."""
+    missed: tuple[tuple[float, ...], ...] = ()
+    """By what share the error of every part left out grows without every effect, all others fitted
+    anew: one that stands in for another makes some part better."""
     rows: float = 1.0
     """Number of independent rows that the effects were chosen on."""
     travel: tuple[float, ...] = ()

@@ -14,7 +14,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.predicting.allowed import elsewhere
 from weld_twin_core.diagnosis.result import Shrink
-from weld_twin_core.effects import REGISTRY
+from weld_twin_core.effects import REGISTRY, Quantization, ToolSlip
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.directions import Directions
@@ -339,6 +339,24 @@ def test_on_a_path_a_tool_strays_as_far_as_a_stretch_of_the_recordings_did():
     off = np.linalg.norm(known.drawn(seen)[:, 0], axis=2)
     # Every other model strays, at one place each.
     assert np.all((off > 9e-4).sum(axis=0) == np.tile([0, 1], 200))
+
+
+@pytest.mark.parametrize(
+    'law', [ToolSlip(xyz=[0.0, 3e-4, 0.0], time=2.05), Quantization('shoulder_pan_joint', 1e-3)]
+)
+def test_a_correction_that_jumps_is_off_by_the_jump_where_it_comes_early_or_late(law):
+    robot = load('ur5')
+    known = posterior(robot, Directions((), 1, ()), np.zeros((0, 0)))
+    t = np.linspace(0.0, 4.0, 201)
+    q = np.array([0.3, -1.2, 1.4, 0.2, 0.5, -0.3]) + 1e-2 * t[:, None] * np.eye(6)[0]
+    recording = Recording('path', JointMotion(t, q))
+    twin = Twin(robot, [law])
+    off = np.linalg.norm(known.drawn(Features(twin, recording, t))[:, 0], axis=2)
+    poses = [each.poses(recording).position for each in (twin, Twin(robot))]
+    jump = np.linalg.norm(np.diff(poses[0] - poses[1], axis=0), axis=1).max()
+    # What is 95 % sure counts with it; neighbours of a step may drift on top. Most samples are not off.
+    assert 0.99 * jump < np.quantile(off.max(axis=0), 0.95) < 1.6 * jump
+    assert (off > 0.5 * jump).mean() < 0.03
 
 
 def test_the_shrink_elsewhere_reaches_as_far_as_the_model_may_be_off_there():

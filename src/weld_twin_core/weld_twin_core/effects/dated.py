@@ -74,7 +74,7 @@ class Sudden(_Timed):
     """
 
     time: float
-    traits = Traits(depends_on='time', dated=True, common=False)
+    traits = Traits(depends_on='time', dated=True, jumps=True, common=False)
 
     def share(self, view: View) -> Array:
         return (view.t >= self.time).astype(np.float64)

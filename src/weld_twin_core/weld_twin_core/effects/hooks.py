@@ -71,6 +71,8 @@ class Traits:
     """Whether it belongs to one set-up and not to the robot."""
     dated: bool = False
     """Whether it sets in at an instant, and is a cause only where the data checks found one."""
+    jumps: bool = False
+    """Whether it jumps at an instant or at places of its joint, of which no derivative knows."""
     common: bool = True
     """Whether every arm has a little of it, so that a fit of many small errors takes it along."""
     demand: int = 0

@@ -76,6 +76,7 @@ class Quantization(Effect):
         formula='θ → step · round(θ / step)',
         entered='the encoder',
         depends_on='angle',
+        jumps=True,
         common=False,
         by_motion=True,
     )

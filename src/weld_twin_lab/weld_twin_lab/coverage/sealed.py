@@ -22,7 +22,7 @@ from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.posterior import Drawn, places
+from weld_twin_core.twin.posterior import Drawn
 from weld_twin_core.twin.program_accuracy import SURE, accuracy
 from weld_twin_core.twin.twin import Twin
 
@@ -160,8 +160,7 @@ def _of_path(
     t, real = measured.t[here], measured.position[here]
     twin = twin_for(found.model, train, test)
     foretold, nominal = (each.poses(test, t).position for each in (twin, Twin(twin.robot)))
-    at, near = places(t.size)
-    drawn = Drawn(near, posterior.drawn(Features(twin, test, t[at])))
+    drawn = Drawn(np.arange(t.size), posterior.drawn(Features(twin, test, t)))
     for when, wanted in (('before', nominal), ('after', foretold)):
         told = accuracy([wanted - foretold], [drawn])
         assert told is not None

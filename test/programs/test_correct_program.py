@@ -179,6 +179,17 @@ def test_a_temperature_in_kelvin_and_one_that_is_none_are_refused(degrees, tmp_p
     assert said.code == 2 and 'the temperature is' in said.err
 
 
+def test_a_tool_in_metres_is_refused_and_one_that_no_move_names_is_told(tmp_path):
+    text, how = (MADE / 'bracket.ls').read_text(), {'name': 'p.ls', 'robot': 'fanuc_m10ia'}
+    said = corrected(tmp_path, text, '--tool', '1=0,0,0.25,0,0,0', **how)
+    assert said.code == 2 and 'is 0.25 mm long' in said.err
+    said = corrected(tmp_path, SEAM, '--tool', 'torch=0,0,0.25,0,0,0')
+    assert said.code == 0, said.err
+    assert "no move names the tool 'torch' that was given" in said.out
+    said = corrected(tmp_path, text, '--tool', '1=0,0,250,0,0,0', '--force', **how)
+    assert said.code == 0 and 'no move names' not in said.out
+
+
 def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):
     said = corrected(tmp_path, SEAM, '--max-correction', '0.2mm', '1deg', offset=5e-4)
     assert said.code == 0, said.err

@@ -260,7 +260,13 @@ def _clamped(file: str, robot: Robot, options: TableOptions) -> Table:
     return Table(replace(touches, contacts=None, measured=clamped, notes=said), said)
 
 
+SHORTEST = 1e-3
+"""Length [m] below which a tool is one of metres that were taken for millimetres."""
+
+
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:
+    import numpy as np
+
     from weld_twin_msgs_py.programs.languages import pose_notation
 
     notation = pose_notation(language)
@@ -272,6 +278,12 @@ def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array
         if not sign or not name or len(values) != count:
             raise DataError(f'{option} needs NAME={",".join(notation.name.split())}, got {text!r}')
         out[name] = notation.value(values)
+        length = float(np.linalg.norm(out[name][:3, 3]))
+        if option == '--tool' and 0.0 < length < SHORTEST:
+            raise DataError(
+                f'{option} {text!r} is {length * 1e3:g} mm long; give the numbers as the controller '
+                'shows them, lengths in mm'
+            )
     return out
 
 

@@ -185,7 +185,7 @@ def _read_back(
 
 
 def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:
-    out = [*program.notes, *context.controller.notes]
+    out = [*program.notes, *context.controller.notes, *_unused(program, context)]
     if CORRECTED in context.robot.source:
         out.append(CORRECTED_ROBOT)
     tools = [
@@ -207,6 +207,22 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         out.append(NOT_SURE)
     elif frames := model.posterior.directions.frames:
         out.append(FRAMES_FITTED.format(frames=', '.join(frames)))
+    return out
+
+
+def _unused(program: Program, context: Context) -> list[str]:
+    """Return which frames were given that no move names: a slip of the name, and they count nothing."""
+    steps, controller = program.steps, context.controller
+    out = []
+    for what, given, used in (
+        ('tool', controller.tools, {step.tool.name for step in steps}),
+        ('base', controller.bases, {step.base.name for step in steps}),
+    ):
+        named = ', '.join(sorted(used - {''})) or 'none'
+        out += [
+            f'no move names the {what} {name!r} that was given, so it counts nothing; named are: {named}'
+            for name in sorted(given.keys() - {each.lower() for each in used})
+        ]
     return out
 
 

@@ -187,6 +187,7 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
     assert again.probability == own.probability
     assert right.confidence == right.as_dict()['verdict']['learned'] > 0.5
     assert all(s.features['wander'] > own.features['wander'] for s in imitating)
+    assert all(s.features['least missed'] < own.features['least missed'] for s in imitating)
     assert all(s.probability < own.probability for s in imitating)
     assert other.confidence < right.confidence or other.status == 'unknown'
 

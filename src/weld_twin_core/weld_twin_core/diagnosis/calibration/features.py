@@ -113,7 +113,9 @@ def of_name(
             'size': log(size),
             'wander': log(wandered),
             'wander over size': log(wandered) - log(size),
-            **of_missed(missed),
+            # What is not missed at all says more than how much others are.
+            'missed': log(float(np.median(missed))),
+            'least missed': log(min(missed)),
             'members': len(row.listed),
             'faint beside others': faint(log(size), others),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
@@ -122,12 +124,6 @@ def of_name(
             f'{ONLY}{row.leader.site.effect}': float(len(row.listed) == 1),
         }
     )
-
-
-def of_missed(growths: Sequence[float]) -> Numbers:
-    """Return by how much unseen parts get worse without a name, in the median and at the least."""
-    median = float(np.median(growths)) if len(growths) else 0.0
-    return {'growth': log1(median), 'least growth': log1(min(growths, default=0.0))}
 
 
 def of_level(row: Row, level: str) -> Numbers:
@@ -169,7 +165,8 @@ def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
     """
     return plain(
         {
-            **of_missed(family.growths),
+            'growth': log1(family.growth),
+            'least growth': log1(min(family.growths, default=0.0)),
             'size': log(family.rms_m / max(floor, 1e-12)),
             'members': len(cause.name),
             'kinds': kinds,

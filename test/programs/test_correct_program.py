@@ -86,6 +86,17 @@ def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
         assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
 
 
+@pytest.mark.parametrize('language', ['krl', 'rapid', 'inform', 'fanuc-ls'])
+def test_a_program_that_was_cut_off_is_refused(language, tmp_path):
+    robot, files, _, _ = CELLS[language]
+    for name in files:
+        (tmp_path / name).write_bytes((MADE / name).read_bytes())
+    path = tmp_path / files[0]
+    path.write_bytes(path.read_bytes().rstrip()[:-9].rstrip())
+    said = weld_twin('correct', path, '--robot', robot, '--out', tmp_path / 'out')
+    assert said.code == 2 and 'is the file cut off?' in said.err
+
+
 def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
     said = weld_twin(
         *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),

@@ -46,6 +46,8 @@ class Language(NamedTuple):
     """How it writes a pose."""
     beside: tuple[str, ...] = ()
     """Extensions of files that belong to a program and lie beside it."""
+    last: str = ''
+    """The word that ends a program and everything before it; empty where there is none."""
 
 
 LANGUAGES: dict[str, Language] = {
@@ -59,9 +61,12 @@ LANGUAGES: dict[str, Language] = {
         KrlReader,
         KUKA_POSE,
         ('.dat',),
+        'END',
     ),
-    'inform': Language('Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE),
-    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE),
+    'inform': Language(
+        'Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE, last='END'
+    ),
+    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE, last='/END'),
     'joint-trajectory': Language(
         'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', TrajectoryReader, CSV_POSE
     ),
@@ -72,6 +77,7 @@ LANGUAGES: dict[str, Language] = {
         r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
         RapidReader,
         ABB_POSE,
+        last='ENDMODULE',
     ),
 }
 """By the names that ``--controller`` takes."""
@@ -114,6 +120,7 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
     """
     source = read_source(path)
     name = language_of(source, path, controller)
+    _refuse_cut(source, LANGUAGES[name])
     place, beside = Path(path), []
     for extension in LANGUAGES[name].beside:
         result = [
@@ -123,6 +130,20 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
         ]
         beside += [read_source(other) for other in result[:1]]
     return read_sources([source, *beside], context, name)
+
+
+def _refuse_cut(source: Source, language: Language) -> None:
+    """Refuse a program whose last line that says something is not its end."""
+    said = re.sub(
+        f'(?:{"|".join(language.reader.comments) or "$."})|\x1a', '', source.text
+    ).rstrip()
+    word = said.rpartition('\n')[2].strip().upper()
+    whole = word == language.last or (language.last == 'END' and word == 'ENDFCT')
+    if language.last and not whole:
+        raise DataError(
+            f'{source.where(len(source.text.rstrip()) - 1)}: the program does not end with '
+            f'{language.last}; is the file cut off?'
+        )
 
 
 def read_sources(sources: Sequence[Source], context: Context, name: str) -> Program:

@@ -14,8 +14,10 @@ from weld_twin_core.diagnosis.calibration.features import (
     faint,
     hardly_a_gap,
     odds,
+    of_name,
     of_situation,
     of_whole,
+    part_of_a_wave,
 )
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
@@ -159,6 +161,29 @@ def test_marginals_of_a_row_are_sums_over_who_shares_it():
     )
     row = Row.of(sure, wt.diagnosis.Beliefs())
     assert row.listed == (zero,)
+
+
+def test_pieces_of_one_curve_are_counted():
+    def row(effect, joint):
+        return Row((Alternative(Site(effect, joint), 9.0, _Fit(), 1.0),), ())
+
+    beside = [row('joint_offset', 'wrist'), row('backlash', 'wrist'), row('gear_ratio', 'elbow')]
+    for effect, joint, pieces in (
+        ('gear_ratio', 'wrist', 1.0),
+        ('joint_compliance', 'wrist', 0.0),
+        ('gear_ratio', 'base', 0.0),
+    ):
+        told = of_name(row(effect, joint), 2.0, 1.0, (0.1,), beside)
+        assert told['others of its curve'] == pieces
+        assert told['faint beside others'] == 0.0
+
+
+def test_waves_of_which_the_slowest_is_seen_in_part_are_any_smooth_curve():
+    turn = 2.0 * np.pi
+    assert part_of_a_wave(np.array([1.0, 9.0]), 0.1 * turn) == pytest.approx(1.0)
+    assert part_of_a_wave(np.array([1.0, 9.0]), 1.5 * turn) == 0.0
+    assert part_of_a_wave(np.array([1.0]), 0.1 * turn) == 0.0
+    assert part_of_a_wave(np.zeros(0), np.inf) == 0.0
 
 
 @pytest.fixture(scope='module')

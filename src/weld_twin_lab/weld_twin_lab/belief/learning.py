@@ -222,6 +222,8 @@ class Scaled(NamedTuple):
     @classmethod
     def of(cls, values: Array) -> Scaled:
         """Return the scaling of examples; what an older example lacks counts as usual."""
+        # A feature that no example has yet is left out.
+        values = np.where(np.isnan(values).all(axis=0), 0.0, values)
         low, high = np.nanquantile(values, ENDS, axis=0)
         # A family that is named seldom is named all the same.
         rare = low == high

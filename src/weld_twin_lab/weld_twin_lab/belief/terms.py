@@ -61,6 +61,8 @@ TERMS: dict[str, dict[str, int]] = {
         'evidence': 1,
         'size': 1,
         'faint beside others': -1,
+        'others of its curve': -1,
+        'part of a wave': -1,
         'wander over size': -1,
         'missed': 1,
         'least missed': 1,

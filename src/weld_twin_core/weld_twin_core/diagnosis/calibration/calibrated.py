@@ -71,16 +71,26 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
         return Stated(table, (), None, situation, evidence.floor)
     sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
     each = list(zip(table, sizes, evidence.wandered, evidence.missed, strict=False))
-    on, others = evidence.structure.depends_on, len(each) - 1
-    every = [
-        of_name(row, size, wandered, missed, others, on) for row, size, wandered, missed in each
-    ]
+    on = evidence.structure.depends_on
+    every = []
+    for row, size, wandered, missed in each:
+        beside = [one for one, *_ in each if one is not row]
+        travel = _travel(evidence, row)
+        every.append(of_name(row, size, wandered, missed, beside, on, travel))
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
         return Stated(table, (), None, situation, evidence.floor)
     whole = of_whole([one.probability for one in names], [one.features for one in names])
     nameless = _told('nameless', None, {**situation, **whole}, learned)
     return Stated(table, names, nameless, situation, evidence.floor)
+
+
+def _travel(evidence: Evidence, row: Row) -> float:
+    """Return how far the joint of an effect moves [rad, m]; without end where it has none."""
+    joint = row.leader.site.joint
+    if joint is None or not evidence.travel:
+        return float('inf')
+    return evidence.travel[row.leader.fit.model.robot.index(joint)]
 
 
 def calibrated(

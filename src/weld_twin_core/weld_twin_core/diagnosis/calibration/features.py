@@ -16,6 +16,7 @@ from math import isnan
 
 import numpy as np
 
+from ...arrays import Array
 from ..beliefs import Beliefs
 from ..result import Cause, Family
 from ..verdict.decision import Left
@@ -92,8 +93,9 @@ def of_name(
     size: float,
     wandered: float,
     missed: Sequence[float],
-    others: int = 0,
+    beside: Sequence[Row] = (),
     left_at: Sequence[str] = (),
+    travel: float = np.inf,
 ) -> Numbers:
     """
     Return the features of the name of an effect found, from its row of the table of answers.
@@ -101,10 +103,12 @@ def of_name(
     size: how far the effect moves the tool, RMS in units of noise.
     wandered: how far its values move from stretch to stretch, over what noise makes them.
     missed: by what share the error of every part left out grows without it.
-    others: how many effects were found beside it.
+    beside: rows of the other effects found.
     left_at: what the most of what is left depends on, in words.
+    travel: of its joint [rad].
     """
     on = row.leader.dependence
+    own = sum(one.leader.place == row.leader.place and of_curve(one) for one in beside)
     return plain(
         {
             'weight': odds(row.mass),
@@ -117,13 +121,38 @@ def of_name(
             'missed': log(float(np.median(missed))),
             'least missed': log(min(missed)),
             'members': len(row.listed),
-            'faint beside others': faint(log(size), others),
+            'faint beside others': faint(log(size), len(beside)),
+            'others of its curve': own if of_curve(row) else 0.0,
+            'part of a wave': part_of_a_wave(row.leader.orders, travel),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
             'constant': float(on == 'constant'),
             'angle': float(on == 'angle'),
             f'{ONLY}{row.leader.site.effect}': float(len(row.listed) == 1),
         }
     )
+
+
+def of_curve(row: Row) -> bool:
+    """
+    Return whether an effect is a constant of its joint, or a slope or wave over its angle.
+
+    Several at one place are what a curve without a formula is taken to pieces by.
+    """
+    return row.leader.dependence in ('constant', 'angle')
+
+
+def part_of_a_wave(orders: Array, travel: float) -> float:
+    """
+    Return by how much the travel of a joint falls short of the slowest of several waves.
+
+    Decimal logarithm, 0 of a single wave. Waves of which one is seen in part are any smooth curve.
+
+    orders: of the waves [1/rev], shape (K,).
+    travel: of the joint [rad].
+    """
+    if orders.size < 2:
+        return 0.0
+    return max(-log(float(orders.min()) * travel / (2.0 * np.pi)), 0.0)
 
 
 def of_level(row: Row, level: str) -> Numbers:

@@ -62,6 +62,12 @@ class Alternative:
         return REGISTRY[self.site.effect].traits.depends_on if effect is None else effect.on
 
     @property
+    def orders(self) -> Array:
+        """Return the orders of the waves that it is a sum of, shape (K,) [1/rev]; none of others."""
+        effect = self._fitted
+        return np.zeros(0) if effect is None else np.asarray(effect.search.orders())
+
+    @property
     def _fitted(self) -> Effect | None:
         return next((e for e in self.fit.model.found if Site.of(e) == self.site), None)
 

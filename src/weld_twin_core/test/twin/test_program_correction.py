@@ -95,6 +95,21 @@ def test_a_seam_whose_worst_place_would_gain_nothing_is_left_with_a_word_of_wher
     assert 'its worst place would be' in why and not why.startswith('its')
 
 
+def test_a_seam_is_left_that_would_be_farther_off_on_most_of_its_way(ur5):
+    # The zero is off by half of the play: on the way out, which is long, both cancel.
+    play = wt.effects.Backlash('shoulder_pan_joint', width=4e-4)
+    off = wt.effects.JointOffset('shoulder_pan_joint', offset=2e-4)
+    points = tuple(START + [turn, 0.0, 0.0, 0.0, 0.0, 0.0] for turn in (0.0, -0.02, 0.3, 0.6))
+    straight = (Move('linear', use(k), EYE) for k in (1, 2, 3))
+    there = MoveProgram(points, ((Move('joint', use(0), EYE), *straight),))
+    found = correct_program(ProgramModel(ur5, (off, play)), there, caps=Caps(1e-3, 0.01))
+    (why,) = found.left.values()
+    assert 'over all of its way it would be' in why
+    assert not found.calm
+    for old, new in zip(points, found.program.points, strict=True):
+        np.testing.assert_array_equal(old, new)
+
+
 @pytest.mark.parametrize(('cap', 'left'), [(1e-3, set()), (1e-4, {0})])
 def test_a_seam_is_corrected_whole_or_not_at_all(ur5, cap, left):
     off = wt.effects.JointOffset('shoulder_lift_joint', offset=5e-4)

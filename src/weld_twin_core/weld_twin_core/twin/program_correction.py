@@ -230,10 +230,11 @@ class _Work(NamedTuple):
         """Return the seams that points cannot be moved for, with the reason."""
         out: dict[int, str] = {}
         worst: dict[int, tuple[float, float, str]] = {}
+        seen: dict[int, list[Array]] = {}
         for piece in self.travel.pieces:
             motion = repeated(self.model.robot, moved, piece)
             meant = self.gap(piece, motion, calm)
-            sizes = [self._sizes(piece, one) for one in (piece.motion, motion)]
+            sizes = np.array([self._sizes(piece, one) for one in (piece.motion, motion)])
             for k, move in enumerate(piece.moves):
                 off = meant[piece.ends[k]]
                 apart = np.linalg.norm(off[:3]) > _APART[0] or np.linalg.norm(off[3:]) > _APART[1]
@@ -241,14 +242,19 @@ class _Work(NamedTuple):
                     size = f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here'
                     out.setdefault(move.seam, f'{move.where}: {size}, {self._left(move.end)}')
                 # How the arm comes to where a seam begins does not matter, only that it gets there.
-                chosen = piece.move == k if move.seam in worst else piece.ends[k]
-                before, after = (float(size[chosen].max()) for size in sizes)
+                chosen = piece.move == k if move.seam in worst else piece.ends[[k]]
+                before, after = sizes[:, chosen].max(axis=1).tolist()
+                seen.setdefault(move.seam, []).append(sizes[:, chosen])
                 old = worst.get(move.seam, (0.0, -1.0, ''))
                 where = move.where if after > old[1] else old[2]
                 worst[move.seam] = max(before, old[0]), max(after, old[1]), where
         for seam, (before, after, where) in worst.items():
+            usual = np.sqrt((np.concatenate(seen[seam], axis=1) ** 2).mean(axis=1)).tolist()
             if after > BETTER * before + NOTHING:
                 out.setdefault(seam, f'{where}: {_worse(before, after)}')
+            elif usual[1] > usual[0] + NOTHING:
+                way = f'{usual[1] * 1e3:.3f} mm off, RMS, instead of {usual[0] * 1e3:.3f} mm'
+                out.setdefault(seam, f'{where}: over all of its way it would be {way}')
         return {seam: why for seam, why in out.items() if seam not in remaining}
 
     def _sizes(self, piece: Piece, motion: JointMotion) -> Array:

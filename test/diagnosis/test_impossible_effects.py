@@ -14,8 +14,6 @@ from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses import search
 from weld_twin_core.diagnosis.hypotheses.selection import implausible
-from weld_twin_lab.belief.mix import SEVERAL, drawn
-from weld_twin_lab.belief.trial import diagnosed, recordings_of
 
 LINK = effect('link_length', joint='shoulder_lift_joint', da=4e-4)
 
@@ -40,15 +38,6 @@ def test_a_swing_that_is_damped_as_none_is_hides_no_link(frequency):
 def test_a_swing_that_is_larger_than_any_ends_the_search():
     found, refused = looked_for(4.0, 0.1, 12.0)
     assert (found, refused) == (set(), {('vibration', 'elbow_joint')})
-
-
-def test_several_causes_together_that_look_like_one_no_machine_has_are_found():
-    """Six causes: a bearing that leans by 5 mrad, more than any does, explains the most at first."""
-    case, *_ = drawn(198002, 41, SEVERAL)
-    told = diagnosed(case, recordings_of(case), held_out=False)
-    named = {(site.effect, site.joint) for group in told.indistinguishable for site in group}
-    true = {(cause['effect'], cause.get('joint')) for cause in case.causes}
-    assert len(true) == 6 and true <= named
 
 
 def test_what_stands_in_for_several_makes_room_when_one_of_them_drives_it_beyond_its_limits():

@@ -3,11 +3,11 @@
 """Standard errors cover the truth where residuals hang together, and say so where none are."""
 
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, effect, known_scale, tiny
-from scipy.signal import lfilter
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.fit import fit
@@ -29,7 +29,8 @@ def deviations(hang):
     for seed in range(RUNS):
         problem, model = tiny((OFFSET,), seed, count=240, static=False, turned=False, noise=0.0)
         white = np.random.default_rng(seed + 1000).normal(size=(240, 3))
-        noise = SIGMA * np.sqrt(1.0 - hang**2) * lfilter([1.0], [1.0, -hang], white, axis=0)
+        hung = np.array(list(accumulate(white, lambda last, new: hang * last + new)))
+        noise = SIGMA * np.sqrt(1.0 - hang**2) * hung
         recording = problem.recordings[0]
         seen = recording.measured
         spoilt = recording.with_measured(replace(seen, position=seen.position + noise))

@@ -135,8 +135,10 @@ def pytest_xdist_make_scheduler(config, log):
 FEWER, FORGOTTEN = 24, 6
 """Models that a diagnosis draws in tests, and those until the chain has forgotten its start: a quarter
 of what users get, so that what is named may not hang on how many are drawn."""
+STATIONS, PATHS = 24, 3
+"""Stations and paths that the next measurement is chosen from in tests: a third of what users get."""
 DRAWN = 'drawn'
-"""Mark of files that are about what is drawn, or run what users run from end to end."""
+"""Mark of files that are about what is drawn or proposed, or run what users run from end to end."""
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -144,12 +146,14 @@ def fewer_models(request):
     """
     Let diagnoses draw fewer models in files without the mark `DRAWN`: a fifth of their time.
 
-    Those that leave out most kinds of causes do not look at these at all, which is half of theirs.
-    Who leaves out a few asks for what is then held against them in their place.
+    The next measurement, another fifth, is chosen from fewer. Those that leave out most kinds of
+    causes do not look at these at all, which is half of theirs.
+    Who leaves out a few asks for what is then held against what is found, in its place.
     """
     if request.node.get_closest_marker(DRAWN) is not None:
         yield
         return
+    from weld_twin_core.diagnosis.advice import candidates
     from weld_twin_core.diagnosis.hypotheses import library, search
     from weld_twin_core.diagnosis.predicting import sizes
 
@@ -166,6 +170,8 @@ def fewer_models(request):
     with pytest.MonkeyPatch.context() as changed:
         changed.setattr(sizes, 'SWEEPS', FEWER)
         changed.setattr(sizes, 'LEARNING', FORGOTTEN)
+        changed.setattr(candidates, 'STATIONS', STATIONS)
+        changed.setattr(candidates, 'PATHS', PATHS)
         changed.setattr(search, 'build', of_few)
         yield
 

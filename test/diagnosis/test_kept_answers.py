@@ -27,6 +27,7 @@ from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.diagnosis.predicting import sizes
 from weld_twin_core.effects import REGISTRY
 
+pytestmark = pytest.mark.drawn
 LIBRARY = 'library'
 """Key of the kept file with the effects that were there: one that is new changes no kept answer."""
 FILE = Path(__file__).with_name('kept_answers.json')

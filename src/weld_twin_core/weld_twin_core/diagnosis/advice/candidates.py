@@ -17,9 +17,9 @@ from ..algebra.problem import Model, Problem
 from .postures import Limits, Room, joined
 
 NAME = 'next measurement'
-_STATIONS = 80
+STATIONS = 80
 """Stations to choose from; more only take time."""
-_PATHS = 9
+PATHS = 9
 """Paths of all joints to choose from: three, each at three speeds."""
 _SINGLE = 4
 """Joints at most that move alone in some paths: those in question."""
@@ -113,13 +113,13 @@ class _Here:
         self.problem, self.model = problem, model
         self.room = Room(problem, model.robot, limits)
         # Elsewhere than the experiments before.
-        skip = _STATIONS * (len(problem.recordings) - 1)
-        self.spread = self.room.spread(_STATIONS, skip)
+        skip = STATIONS * (len(problem.recordings) - 1)
+        self.spread = self.room.spread(STATIONS, skip)
 
     def path(self, joints: Sequence[str]) -> Candidate:
         """Return ways from home and back: all joints at once, seams, those in question alone."""
         room, motions, at = self.room, [], 0
-        for k in range(_PATHS):
+        for k in range(PATHS):
             stops = [room.home]
             while len(stops) < 4 and at < len(self.spread):
                 if room.way([stops[-1], self.spread[at]]):

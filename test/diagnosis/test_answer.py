@@ -78,7 +78,7 @@ SCHEMA = {
 ANSWERS = {
     'play': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {}),
     'tool': ((('tool_pose', 'xyz', (4e-4, -3e-4, 2e-4), 'rotvec', (6e-4, 0.0, -8e-4)),), {}),
-    'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {}),
+    'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {'robot': 'ur5'}),
     'unknown': (
         (('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
         {

@@ -19,9 +19,13 @@ KEPT = Path(__file__).parents[4] / 'docs/results/belief'
 SHIPPED = json.loads(files(calibration).joinpath(FILE).read_text(encoding='utf-8'))
 
 
-def test_the_shipped_weights_are_what_the_kept_cases_teach(monkeypatch):
-    # One partition takes a quarter of the time; what is sure hangs on it by thousandths.
+@pytest.fixture(autouse=True)
+def one_partition(monkeypatch):
+    """Take a quarter of the time; what is sure hangs on it by thousandths."""
     monkeypatch.setattr(learning, 'PARTITIONS', 1)
+
+
+def test_the_shipped_weights_are_what_the_kept_cases_teach():
     taught = study.fit(read_rows(KEPT / belief.LEARNED))
     assert taught['card']['seeds'] == SHIPPED['card']['seeds']
     assert taught['sure_from'] == pytest.approx(SHIPPED['sure_from'], abs=6e-3)

@@ -52,6 +52,8 @@ def pytest_addoption(parser):
 CELLS = 'cells'
 WHOLE = ('contacts', 'diagnosis', 'report', 'soundness')
 """Folders whose tests make whole diagnoses, or open pages."""
+ASKS = re.compile(r"diagnosed?\(|'diagnose'|'investigate'|browser|chromium")
+"""What files elsewhere say that make diagnoses or open pages."""
 
 
 def pytest_collection_modifyitems(items):
@@ -62,7 +64,8 @@ def pytest_collection_modifyitems(items):
     pyproject.toml lists them.
     """
     first = {item.path for item in items if item.get_closest_marker('slow')}
-    whole = {item.path for item in items if item.path.parent.name in WHOLE}
+    files = {item.path for item in items}
+    whole = {p for p in files if p.parent.name in WHOLE or ASKS.search(p.read_text('utf-8'))}
     items.sort(
         key=lambda item: (
             item.get_closest_marker(CELLS) is None,

@@ -109,12 +109,6 @@ def test_the_ten_lines_of_python_draw_and_find_the_play(monkeypatch, capsys):
     names['plt'].close('all')
 
 
-@pytest.mark.cells
-def test_the_harness_example_runs():
-    pytest.importorskip('rclpy', reason='needs ROS 2')
-    assert len(run(example('from weld_twin_nodes.harness import Cell'))['poses']) > 0
-
-
 def test_the_example_bag_is_what_its_readme_says(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     command = re.search(r'`(weld-twin simulate [^`]+)`', (ROOT / 'bags/README.md').read_text())[1]

@@ -1,10 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""`demo`: the whole job in one command, and what it leaves behind."""
+"""`demo`: the whole job in one command, and what it leaves behind; nodes in the README's Python."""
 
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -73,3 +74,10 @@ def test_the_demo_does_not_replace_what_it_did_not_make(tmp_path, weld_twin):
     assert result.code == 2
     assert 'holds something else already' in result.err
     assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']
+
+
+def test_the_harness_example_of_the_readme_runs():
+    every = re.findall(r'```python\n(.*?)```', (ROOT / 'README.md').read_text(), re.DOTALL)
+    (code,) = (each for each in every if 'from weld_twin_nodes.harness import Cell' in each)
+    exec(compile(code, 'README.md', 'exec'), names := {})
+    assert len(names['poses']) > 0

@@ -158,8 +158,7 @@ def read_recording(
         made = bag.provenance
         touched = marks(bag, names)
         seen = [] if touched else images(bag, names)
-        measured = touched or seen or {Role.POSE, Role.POINT} & set(roles)
-        if needs_measurements and not measured:
+        if needs_measurements and not (touched or seen or {Role.POSE, Role.POINT} & set(roles)):
             raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
         raise DataError(
@@ -177,13 +176,20 @@ def read_recording(
         one_clock=one_clock,
         notes=_notes(names, streams, intake, bool(points)),
     )
-    if 'counted' in made:
-        whole = replace(whole, counted=Counted.from_mapping(made['counted'], robot.n))
+    whole = _counted(whole, made)
     if touched:
         return touching(whole, touched, made)
     if seen:
         whole = looking(whole, seen, names, made)
     return _with_what_is_missing(_inverted(whole, names), made, _ends(names, samples))
+
+
+def _counted(recording: Recording, made: Mapping[str, Any]) -> Recording:
+    """Return the recording with how the controller counts the joints, where its bag says it."""
+    entry = made.get('counted')
+    if entry is None:
+        return recording
+    return replace(recording, counted=Counted.from_mapping(entry, recording.joints.q.shape[1]))
 
 
 def _inverted(recording: Recording, names: TopicNames) -> Recording:

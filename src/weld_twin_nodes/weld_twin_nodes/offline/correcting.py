@@ -137,8 +137,6 @@ def corrected_program(
     Raises DataError: there is no move to correct, or none that can be.
     """
     name = program.sources[0].name
-    if start is not None and (why := context.otherwise()):
-        raise DataError(f'--start holds joint values: {why}')
     if readings:
         where = [f'{p.where}: {p.name} holds' for p in program.points if p.value.ndim == 1]
         where += [] if start is None else ['--start holds']

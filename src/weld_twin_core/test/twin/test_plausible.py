@@ -49,6 +49,24 @@ def test_a_robot_of_four_kilograms_payload_cannot_lack_ten():
     assert [(name, value) for name, value, _ in beyond(UR5, effects[0])] == [('mass', -10.5)]
 
 
+def test_joints_of_an_arm_on_a_desk_may_be_softer_than_those_of_a_cobot():
+    usual = plausible(UR5, 'joint_compliance', 'compliance', 'elbow_joint')
+    assert (usual.sd, usual.low, usual.high) == (3e-5, -1e-5, 3e-4)
+    desk = UR5.to_mapping()
+    for link in desk['links']:
+        link['mass'] *= 0.05
+    for joint in desk['joints']:
+        joint['a'], joint['d'] = 0.4 * joint['a'], 0.4 * joint['d']
+    small = Robot.from_mapping(desk)
+    soft = plausible(small, 'joint_compliance', 'compliance', 'elbow_joint')
+    assert 3e-3 < soft.high < 3e-2
+    assert soft.high / soft.sd == pytest.approx(usual.high / usual.sd)
+    spring = [{'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-3}]
+    assert not beyond(small, effects_from_list(spring, small)[0])
+    bare = Robot.from_mapping({key: own for key, own in desk.items() if key != 'links'})
+    assert plausible(bare, 'joint_compliance', 'compliance', 'elbow_joint').high == usual.high
+
+
 @pytest.mark.parametrize(
     'entry',
     [

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
@@ -24,12 +26,32 @@ from ..errors import DataError, ModelError
 from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import metres, radians, size
 
+SOFTEST = 3e-4
+"""Compliance of the softest joint [rad/(N m)] of an arm that is heavy enough for it."""
+_SAG = np.pi / 180.0
+"""Most that a joint sags under its arm's own weight [rad]: a degree is seen by the eye, and nobody sells
+it. A judgement."""
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 """Load torque for each N m of measured effort: against it where it holds the load."""
 _STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
+
+
+def lightness(robot: Robot) -> float:
+    """
+    Return how many times as soft as a cobot's the joints of a robot may be, at least 1.
+
+    Gears are as stiff as what they carry is heavy: a servo on a desk holds a newton metre, and yields a
+    hundred times as much to one as a cobot does. The moment is that of links and payload at half of
+    the reach. Where no masses are known, 1.
+    """
+    if robot.mass is None:
+        return 1.0
+    weight = float((robot.mass.sum() + robot.payload_mass) * np.linalg.norm(robot.gravity))
+    reach = float(np.hypot(robot.a, np.where(robot.prismatic, 0.0, robot.d)).sum())
+    return max(_SAG / max(0.5 * weight * reach, 1e-3) / SOFTEST, 1.0)
 
 
 class _Twin(TwinHooks):
@@ -76,13 +98,19 @@ class JointCompliance(LinearEffect):
     of = 'joint'
     stage = Stage.ELASTIC
     parameters = (
-        Parameter('compliance', 'rad/(N m)', typical=1e-5)
-        .plausible(
-            (3e-5, -1e-5, 3e-4),
-            'derived: 3,000 N m/rad is the softest gear of a small cobot; a little below zero is a '
-            'controller that mends too much',
-        )
-        .plausible_sliding((1e-6, -1e-7, 1e-4), 'derived: 10 mm under 100 N is the softest axis'),
+        Parameter(
+            'compliance',
+            'rad/(N m)',
+            typical=1e-5,
+            range=Plausible(
+                3e-5,
+                -1e-5,
+                SOFTEST,
+                'derived: 3,000 N m/rad is the softest gear of a small cobot; see `lightness` for '
+                'smaller arms; a little below zero is a controller that mends too much',
+                times=lightness,
+            ),
+        ).plausible_sliding((1e-6, -1e-7, 1e-4), 'derived: 10 mm under 100 N is the softest axis'),
     )
     needs = frozenset({'load'})
     options = ('statics',)

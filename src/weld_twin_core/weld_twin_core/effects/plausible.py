@@ -48,6 +48,9 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
     if result.by_robot is not None:
         low, high = result.by_robot(robot)
         result = replace(result, low=low, high=high)
+    if result.times is not None:
+        by = result.times(robot)
+        result = replace(result, sd=by * result.sd, low=by * result.low, high=by * result.high)
     return _narrowed(result, robot.plausible.get(effect, {}).get(parameter))
 
 

@@ -73,6 +73,8 @@ class Plausible:
     """A publication that was read, or an argument that starts with 'derived'."""
     by_robot: Callable[[Robot], tuple[float, float]] | None = None
     """Returns low and high on a robot, where they hang on it."""
+    times: Callable[[Robot], float] | None = None
+    """Returns how many times as wide spread and range are on a robot, where that hangs on it."""
 
     @property
     def derived(self) -> bool:

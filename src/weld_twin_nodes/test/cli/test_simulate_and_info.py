@@ -210,6 +210,15 @@ def simulated_with(weld_twin, folder, effect, *more):
             'no machine is known beyond 0.13',
         ),
         ('{effect: time_delay, delay: 0.6}', 'no machine is known beyond 0.5'),
+        (
+            '{effect: joint_compliance, joint: elbow_joint, compliance: -8e-6}',
+            'compliance of joint_compliance of elbow_joint is below zero',
+        ),
+        (
+            '{effect: link_length, joint: elbow_joint, da: 2e-4}\n'
+            '- {effect: link_length, joint: elbow_joint, da: 1e-4}',
+            'link_length of elbow_joint is there 2 times, and all count',
+        ),
     ],
 )
 def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(weld_twin, tmp_path, effect, said):

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_core.cameras import Camera, Target
+    from weld_twin_core.effects import Effect
     from weld_twin_core.recording import Recording
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.files.input_files import InputFile
@@ -329,15 +330,15 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
 
     # Recordings that it is for are checked, and mended, by themselves.
     twin = build_twin(robot, path, implausible=implausible, mended=True)
-    say_doubts(twin, path)
+    say_doubts(twin.robot, twin.effects, path)
     return twin
 
 
-def say_doubts(twin: Twin, path: str) -> None:
-    """Say on stderr which values of a model no machine has."""
+def say_doubts(robot: Robot, effects: Sequence[Effect], path: str) -> None:
+    """Say on stderr what in a model may be a slip of its file."""
     from ..offline.given_twin import doubts
 
-    for doubt in doubts(twin):
+    for doubt in doubts(robot, effects):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
 
 

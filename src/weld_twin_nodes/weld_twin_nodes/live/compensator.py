@@ -42,7 +42,7 @@ from .cell_node import CellNode
 from .goal_judge import GoalAudit, GoalJudge, Judged
 from .goal_relay import Decision, GoalRelay
 from .managed_node import ManagedNode
-from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of
+from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of, say_doubts
 from .run_node import run
 from .settings import Setting
 
@@ -220,6 +220,7 @@ class Compensator(ManagedNode):
     def _take_model(self) -> None:
         self._model = loaded(self.robot, self.setting('model'))
         read = self._model.read
+        say_doubts(self, read.robot, read.effects)
         if read.posterior is None:
             self.remark(
                 'the model does not say how sure it is nor where it was recorded: neither is looked at'

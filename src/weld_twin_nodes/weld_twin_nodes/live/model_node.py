@@ -15,7 +15,7 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
 
-from ..offline.given_twin import build_twin, doubts
+from ..offline.given_twin import build_twin
 from ..streams.twin_stream import JointStream, Sample
 from .cell_node import CellNode
 from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, place_twin, robot_of
@@ -74,10 +74,7 @@ class ModelNode(CellNode):
         self.stream.change(twin)
 
     def _twin(self, effects: str) -> Twin:
-        twin = build_twin(self.robot, self.setting('model'), effects)
-        for doubt in doubts(twin):
-            self.warn(doubt, doubt)
-        return place_twin(self, twin)
+        return place_twin(self, build_twin(self.robot, self.setting('model'), effects))
 
     def why_not(self, name: str, value: Any) -> str:
         """Return what is wrong with effects that are set."""

@@ -22,6 +22,7 @@ from weld_twin_core.arm.rotation import (
     transform,
 )
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects import Effect
 from weld_twin_core.errors import DataError, ModelError, TwinError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
@@ -32,6 +33,7 @@ from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
+from ..offline.given_twin import doubts
 from .cell_node import CellNode
 from .settings import NO_NUMBERS, Setting
 from .tf_frames import Frames, frames_of
@@ -143,11 +145,18 @@ def place_robot(node: CellNode, robot: Robot) -> Robot:
 
 def place_twin(node: CellNode, twin: Twin) -> Twin:
     """Return the twin of a model likewise; the parameter counts more than a fitted base."""
+    say_doubts(node, twin.robot, twin.effects)
     robot = place_robot(node, twin.robot)
     moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
     if moved > 0.0:
         node.remark('the base that was given is used; the base of the model differs from it')
     return twin if moved == 0.0 else Twin(robot, twin.effects)
+
+
+def say_doubts(node: CellNode, robot: Robot, effects: Sequence[Effect]) -> None:
+    """Warn of all in a model that may be a slip of its file."""
+    for doubt in doubts(robot, effects):
+        node.warn(doubt, doubt)
 
 
 def frame_from(values: Sequence[float] | str) -> Array:

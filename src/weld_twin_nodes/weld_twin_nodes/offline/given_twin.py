@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.cameras import Camera, Target
@@ -98,20 +101,40 @@ def other_readings(content: Mapping[str, Any]) -> str:
     return ''
 
 
-def doubts(twin: Twin) -> list[str]:
-    """Return a sentence for every value of an effect that no machine has: a unit may be wrong."""
-    return [
+def doubts(robot: Robot, effects: Sequence[Effect]) -> list[str]:
+    """Return a sentence for all that no machine has, and for what counts twice."""
+    out = [
         _doubt(effect, parameter, value, limit)
-        for effect in twin.effects
-        for parameter, value, limit in beyond(twin.robot, effect)
+        for effect in effects
+        for parameter, value, limit in beyond(robot, effect)
     ]
+    for effect in effects:
+        if np.less(getattr(effect, 'compliance', 0.0), 0.0).any():
+            out.append(
+                f'the compliance of {_called(effect)} is below zero: it moves against its load, '
+                'which no spring does, so check its sign'
+            )
+    times = Counter(_all_but_size(effect) for effect in effects)
+    out += [f'{what} is there {n} times, and all count' for (what, _), n in times.items() if n > 1]
+    return out
+
+
+def _all_but_size(effect: Effect) -> tuple[str, str]:
+    """Return how an effect is called, and all else by which two of them are more than one larger one."""
+    sizes = {parameter.name for parameter in effect.parameters if parameter.linear}
+    entry = {key: value for key, value in effect.to_mapping().items() if key not in sizes}
+    return _called(effect), repr(entry)
 
 
 def _doubt(effect: Effect, parameter: str, value: float, limit: float) -> str:
     return (
-        f'{parameter} of {effect.name}{f" of {effect.site}" if effect.site else ""} is {value:g}; '
+        f'{parameter} of {_called(effect)} is {value:g}; '
         f'no machine is known beyond {limit:g}, so check its unit (rad, m, s, kg)'
     )
+
+
+def _called(effect: Effect) -> str:
+    return f'{effect.name}{f" of {effect.site}" if effect.site else ""}'
 
 
 def _possible(robot: Robot, effects: Sequence[Effect], source: str) -> None:

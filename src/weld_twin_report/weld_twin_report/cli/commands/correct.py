@@ -71,7 +71,7 @@ def _corrected_bag(given: Given) -> int:
     robot.refuse_positioner('a compensated motion')
     recording = given.read_bag(given.program, robot)
     made = prediction.compensated(robot, given.model, recording)
-    say_doubts(made.model.twin, given.model)
+    say_doubts(robot, made.model.twin.effects, given.model)
     if made.remark:
         print(f'note: {made.remark}')
     robot.check_positions(made.result.motion.q)
@@ -117,6 +117,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     caps = Caps(_length(length, option), quantity(angle, ('deg', 'rad'), option))
     setup = 0 if given.setup is None else given.setup - 1
     model = correcting.program_model(robot, given.model, given.temperature, setup)
+    say_doubts(robot, model.effects, given.model)
     content = diagnosis_of(given.model)
     made = correcting.corrected_program(
         program, context, model, caps, given.read_start(context), other_readings(content)

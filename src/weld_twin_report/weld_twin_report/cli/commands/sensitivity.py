@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.cli.given import Given, say_doubts
 
 from .. import progress
 
@@ -74,6 +74,7 @@ def _setting(given: Given) -> Setting | None:
             return None
         raise DataError('give --robot R or a BAG to study, or --claims')
     twin = build_twin(_robot(given), given.effects_known)
+    say_doubts(twin.robot, twin.effects, given.effects_known)
     common = {
         'robot': twin.robot,
         'tolerances': _tolerances(given, twin.robot),

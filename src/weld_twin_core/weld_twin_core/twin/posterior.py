@@ -47,9 +47,9 @@ cells it held as many paths as one shift all along, with intervals a fifth narro
 WAVES = 256
 """Functions of posture that it is drawn from."""
 AMISS = 0.1
-"""Part of the jumps of a law that come a place sooner or later than a model has them. A judgement: of
-183 steps of an encoder on two sealed cells four did, of slips, which are seen once, about half do. Below
-a twentieth, what is 95 % sure would leave a slip out."""
+"""Part of the jumps of a law that come a place sooner or later than a model has them. A judgement on
+three sealed cells: of 183 steps of an encoder four did, and the one slip. Below a twentieth, what is
+95 % sure would leave a slip out."""
 SEED = 0
 """Of the draws: every promise is made of the same models."""
 CHUNK = 2000

@@ -428,6 +428,27 @@ def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp
         assert f"'{audit}' has not taken all lines" in planner.process.log
 
 
+def test_what_goes_to_another_compensator_is_not_corrected(tmp_path, packages):
+    model = tmp_path / 'diagnosis.json'
+    write_model(model)
+    with Cell(tmp_path / 'cell') as cell:
+        cell.add(
+            compensator.Compensator,
+            cli_args=[
+                '--ros-args',
+                '-r',
+                '__node:=second',
+                '-r',
+                '~/pose_in:=/compensator/pose_out',
+            ],
+            model=str(model),
+        )
+        planner = Planner(cell, model, apply=True, controller='second')
+        planner.go('configure', 'activate')
+        cell.wait(lambda: '/second, which takes what is sent' in planner.process.log, 'the other')
+        planner.refused(planner.goal(sway()), 'it would correct twice')
+
+
 @pytest.mark.parametrize(
     ('controller', 'sentence'),
     [

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from weld_twin_core.arm.chain import forward
+from weld_twin_core.recording import Counted
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE, TWIN_POSE
@@ -229,3 +232,15 @@ def test_a_diagnosis_can_be_the_model_of_the_twin(cell, robot, tmp_path):
         'a pose with the diagnosed offset',
     )
     bench.close()
+
+
+def test_that_a_model_had_its_joints_as_the_controller_shows_them_is_told(cell, robot, tmp_path):
+    file = tmp_path / 'diagnosis.json'
+    model = {
+        'tool': robot.T_flange_tool.tolist(),
+        'bases': [np.eye(4).tolist()],
+        'counted': Counted(np.tri(6), np.zeros(6)).as_mapping(),
+    }
+    file.write_text(json.dumps({'schema': 'weld_twin/diagnosis/1', 'model': model}))
+    node = cell.start('forward_kinematics_twin', robot='ur5', model=str(file))
+    cell.wait(lambda: 'joints as the controller shows them' in node.log, 'a sentence')

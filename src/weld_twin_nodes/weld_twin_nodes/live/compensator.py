@@ -23,6 +23,7 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
 from weld_twin_msgs_py.messages.goals import corrected_trajectory
 from weld_twin_msgs_py.messages.topics import (
+    AUDIT,
     COMPENSATED,
     CORRECTION,
     DEVIATION,
@@ -45,6 +46,7 @@ from .managed_node import ManagedNode
 from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of, say_doubts
 from .run_node import run
 from .settings import Setting
+from .source import full_names
 
 COMPENSATOR_SETTINGS = (
     Setting(
@@ -294,12 +296,24 @@ class Compensator(ManagedNode):
                 'the process for exact looks has ended; this node makes them between poses'
             )
         if self._model is not None:
-            self._outdated = self._model.outdated(self.setting('max_model_age'))
+            self._outdated = self._model.outdated(self.setting('max_model_age')) or self._twice()
         why = self._withdrawn() if self._active else ''
         if why != self._reported and why.partition(':')[0] != self._reported.partition(':')[0]:
             self.get_logger().warning(why or 'the model is used again')
         self._reported = why
         self.keep(WITHDRAWN, why, logged=False)
+
+    def _twice(self) -> str:
+        """Return that another compensator takes what is sent; empty where none does."""
+        takers = full_names(self.get_subscriptions_info_by_topic(self._out.topic))
+        if self._relay is not None:
+            takers.add(self.resolve_topic_name(self._relay.below).rpartition('/')[0])
+        for name in sorted(takers):
+            if self.count_publishers(f'{name}/{AUDIT.relative.removeprefix("~/")}'):
+                return (
+                    f'{name}, which takes what is sent, is a compensator: it would correct twice'
+                )
+        return ''
 
     def _present(self) -> ProgramModel:
         assert self._model is not None

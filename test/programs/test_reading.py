@@ -304,6 +304,27 @@ UR_LONG, UR_SHORT = UR_TOOL.format(0.25), UR_TOOL.format(0.09)
         ),
         ('urscript', ['while (True):', UR_SEAM, UR_SHORT, UR_SEAM, 'end'], [False, True]),
         ('urscript', ['while (True):', UR_SHORT, UR_SEAM, 'end'], [True]),
+        # A loop that is left halfway: the tool of its end is not what holds after it.
+        (
+            'krl',
+            ['LOOP', KRL_SHORT, 'IF x THEN', 'EXIT', 'ENDIF', KRL_LONG, 'ENDLOOP', KRL_SEAM],
+            [False],
+        ),
+        (
+            'krl',
+            ['LOOP', KRL_LONG, 'IF x THEN', 'EXIT', 'ENDIF', KRL_SEAM, 'ENDLOOP', KRL_SEAM],
+            [True, True],
+        ),
+        (
+            'urscript',
+            ['while (x):', UR_SHORT, 'if (y):', 'break', 'end', UR_LONG, 'end', UR_SEAM],
+            [False],
+        ),
+        (
+            'urscript',
+            ['while (x):', UR_SEAM, UR_SHORT, 'if (y):', 'continue', 'end', UR_LONG, 'end'],
+            [False],
+        ),
     ],
 )
 def test_a_frame_that_not_every_way_sets_is_not_known_after_it(language, parts, known):

@@ -15,6 +15,12 @@ from .controllers import Frame
 Unclear = Callable[[str], Frame]
 """Makes the frame of a place that several ways lead to; takes where they part."""
 Frames = tuple[Frame, ...]
+_CASES = ('switch',)
+"""Words that begin branches of which the first has a word of its own."""
+_PARTED = ('if', *_CASES)
+"""Words that begin branches; all others begin loops."""
+_REST = ('else', 'default')
+"""Words that begin the branch which is taken where no other is."""
 
 
 @dataclass
@@ -22,6 +28,8 @@ class _Block:
     """A loop, or branches of which one is taken."""
 
     where: str
+    word: str
+    """That began it, or its last branch, in lower case."""
     loop: bool
     head: Frames
     """What holds where it begins."""
@@ -29,7 +37,7 @@ class _Block:
     first: int
     """The routine it stands in, and how many moves stand before it."""
     ends: list[Frames] = field(default_factory=list)
-    """What holds at the ends of its branches so far."""
+    """What holds at the ends of its branches so far, and where a loop is left or begun anew within."""
 
 
 class Blocks:
@@ -43,25 +51,32 @@ class Blocks:
         self._program, self._unclear = program, unclear
         self._open: list[_Block] = []
 
-    def begin(self, where: str, now: Frames, *, loop: bool = False) -> None:
-        """Begin a block, where frames hold now."""
-        moves = self._program.pieces[-1]
-        self._open.append(_Block(where, loop, now, moves, len(moves)))
+    def begin(self, where: str, word: str, now: Frames) -> None:
+        """Begin the block of a word, where frames hold now."""
+        moves, word = self._program.pieces[-1], word.lower()
+        self._open.append(_Block(where, word, word not in _PARTED, now, moves, len(moves)))
 
-    def branch(self, now: Frames, *, first: bool = False) -> Frames:
-        """Begin another branch; return what holds there. Before the first, none has ended."""
+    def branch(self, word: str, now: Frames) -> Frames:
+        """Begin the branch of a word; return what holds there."""
         if not self._open:
             return now
-        if not first:
-            self._open[-1].ends.append(now)
-        return self._open[-1].head
+        block = self._open[-1]
+        if block.word not in _CASES:
+            block.ends.append(now)
+        block.word = word.lower()
+        return block.head
 
-    def end(self, now: Frames, *, always: bool = False) -> Frames:
-        """End a block; return what holds after it. One of its branches may be taken always."""
+    def leave(self, now: Frames) -> None:
+        """Leave the loop that is around, or begin its next round."""
+        for block in [each for each in self._open if each.loop][-1:]:
+            block.ends.append(now)
+
+    def end(self, now: Frames) -> Frames:
+        """End a block; return what holds after it."""
         if not self._open:
             return now
         block = self._open.pop()
-        ways = [*block.ends, now] if always else [block.head, *block.ends, now]
+        ways = [*block.ends, now] if block.word in _REST else [block.head, *block.ends, now]
         after = []
         for k, unclear in enumerate(self._unclear):
             alike = all(_same(way[k], ways[0][k]) for way in ways)

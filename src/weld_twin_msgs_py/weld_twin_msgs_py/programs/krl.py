@@ -94,10 +94,13 @@ _ALONG = re.compile(
 """A base that goes along with a positioner; the frame on its flange follows, and a bracket."""
 _BLOCK = re.compile(
     r'^[ \t]*(?:(IF|SWITCH|LOOP|WHILE|FOR|REPEAT)|(ELSE|CASE|DEFAULT)|'
-    r'(END(?:IF|SWITCH|LOOP|WHILE|FOR)|UNTIL))\b',
+    r'(END(?:IF|SWITCH|LOOP|WHILE|FOR)|UNTIL)|EXIT)\b',
     re.I | re.M,
 )
-"""Where the program branches or goes round, another branch, and where they come together."""
+"""
+Where the program branches or goes round, another branch, where they come together, and where a loop
+is left.
+"""
 _AGGREGATE = re.compile(r'\{\s*(?:\w+\s*:)?')
 
 
@@ -137,7 +140,6 @@ class KrlReader(Reader):
         self.tools: list[Frame] = []
         self.bases: list[Frame] = []
         self.blocks = Blocks(self.program, (unclear('$TOOL'), unclear('$BASE'), lambda _: STILL))
-        self.covered: list[str] = []
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
@@ -145,9 +147,7 @@ class KrlReader(Reader):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)
         self._frame_tables()
-        heads = list(_NAMED.finditer(self.text))
-        ends = [*(head.start() for head in heads[1:]), len(self.text)]
-        routines = [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
+        routines = self.routines_of(_NAMED)
         aims = {match[1].lower() for match in re.finditer(_GOTO, self.text, re.I | re.M)}
         labels = [m for m in re.finditer(_LABEL, self.text, re.M) if m[1].lower() in aims]
         tool, base = (
@@ -259,20 +259,14 @@ class KrlReader(Reader):
         """Follow tool, base and whether the tool stands still, through branches and loops."""
         state = self.state
         now: Frames = (state.tool, state.base, STILL if state.still else MOVING)
-        word = (result[1] or result[2] or result[3]).upper()
         if result[1]:
-            self.covered.append(word)
-            self.blocks.begin(self.where(result), now, loop=word not in ('IF', 'SWITCH'))
-            return
-        if not self.covered:
-            return
-        last = self.covered[-1]
-        if result[2]:
-            now = self.blocks.branch(now, first=last == 'SWITCH')
-            self.covered[-1] = word
+            self.blocks.begin(self.where(result), result[1], now)
+        elif result[2]:
+            now = self.blocks.branch(result[2], now)
+        elif result[3]:
+            now = self.blocks.end(now)
         else:
-            self.covered.pop()
-            now = self.blocks.end(now, always=last in ('ELSE', 'DEFAULT'))
+            self.blocks.leave(now)
         state.tool, state.base, state.still = now[0], now[1], now[2] is STILL
 
     def _use(self, tool: Frame | None, base: Frame | None) -> None:

@@ -28,6 +28,7 @@ from .source import (
     YASKAWA_POSE,
     Notation,
     Source,
+    masked,
     read_source,
 )
 from .urscript import UrscriptReader
@@ -46,8 +47,8 @@ class Language(NamedTuple):
     """How it writes a pose."""
     beside: tuple[str, ...] = ()
     """Extensions of files that belong to a program and lie beside it."""
-    last: str = ''
-    """The word that ends a program and everything before it; empty where there is none."""
+    last: tuple[str, ...] = ()
+    """Words of which one is the last line that says something; none where a program has no end."""
 
 
 LANGUAGES: dict[str, Language] = {
@@ -61,12 +62,14 @@ LANGUAGES: dict[str, Language] = {
         KrlReader,
         KUKA_POSE,
         ('.dat',),
-        'END',
+        ('END', 'ENDFCT'),
     ),
     'inform': Language(
-        'Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE, last='END'
+        'Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE, last=('END',)
     ),
-    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE, last='/END'),
+    'fanuc-ls': Language(
+        'FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE, last=('/END',)
+    ),
     'joint-trajectory': Language(
         'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', TrajectoryReader, CSV_POSE
     ),
@@ -77,7 +80,7 @@ LANGUAGES: dict[str, Language] = {
         r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
         RapidReader,
         ABB_POSE,
-        last='ENDMODULE',
+        last=('ENDMODULE',),
     ),
 }
 """By the names that ``--controller`` takes."""
@@ -134,15 +137,11 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
 
 def _refuse_cut(source: Source, language: Language) -> None:
     """Refuse a program whose last line that says something is not its end."""
-    said = re.sub(
-        f'(?:{"|".join(language.reader.comments) or "$."})|\x1a', '', source.text
-    ).rstrip()
-    word = said.rpartition('\n')[2].strip().upper()
-    whole = word == language.last or (language.last == 'END' and word == 'ENDFCT')
-    if language.last and not whole:
+    said = masked(source.text, language.reader.comments).rstrip('\x1a \t\r\n')
+    if language.last and said.rpartition('\n')[2].strip().upper() not in language.last:
         raise DataError(
             f'{source.where(len(source.text.rstrip()) - 1)}: the program does not end with '
-            f'{language.last}; is the file cut off?'
+            f'{language.last[0]}; is the file cut off?'
         )
 
 

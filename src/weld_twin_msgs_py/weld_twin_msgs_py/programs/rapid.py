@@ -105,10 +105,7 @@ class RapidReader(Reader):
         self.again = self.set_again(_ASSIGNED)
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
-        heads = list(_NAMED.finditer(self.text))
-        ends = [*(head.start() for head in heads[1:]), len(self.text)]
-        routines = [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
-        displacing = self.calls(routines, _displaces, _CALLED)
+        displacing = self.calls(self.routines_of(_NAMED), _displaces, _CALLED)
         self.in_order(
             {
                 _MOVE: self._move,

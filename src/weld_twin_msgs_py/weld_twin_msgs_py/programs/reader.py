@@ -66,6 +66,12 @@ class Reader(ABC):
         for _, handle, match in sorted(matches, key=lambda each: each[0]):
             handle(match)
 
+    def routines_of(self, named: re.Pattern[str]) -> list[tuple[str, Span]]:
+        """Return the names of routines, of a pattern's first group, and where their statements stand."""
+        heads = list(named.finditer(self.text))
+        ends = [*(head.start() for head in heads[1:]), len(self.text)]
+        return [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
+
     def calls(
         self, routines: Sequence[tuple[str, Span]], does: Callable[[str], object], call: str
     ) -> list[re.Match[str]]:

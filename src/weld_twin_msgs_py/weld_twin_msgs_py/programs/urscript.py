@@ -51,7 +51,7 @@ OTHER_TOOL = Frame(
 """The tool of a routine that has not set its own."""
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'
-    r'(?:(if|while|for)|(elif|else)|(end))\b)'
+    r'(?:(if|while|for)|(elif|else)|(end)|(break|continue))\b)'
 )
 _NAME, _CALL = re.compile(r'\s*(\w+)'), r'(?<![\w.])(?<!def )(?<!thread ){}\s*\('
 _ASSIGNED = re.compile(
@@ -76,7 +76,7 @@ class UrscriptReader(Reader):
     def read(self) -> Program:
         self._declare()
         routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
-        blocks, ways = Blocks(self.program, (unclear('set_tcp'),)), list[str]()
+        blocks = Blocks(self.program, (unclear('set_tcp'),))
         calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
         words = [*_WORD.finditer(self.text), *calls]
         for result in sorted(words, key=lambda each: each.start()):
@@ -90,17 +90,17 @@ class UrscriptReader(Reader):
                 self.tool = OTHER_TOOL if self.routines > 1 else self.tool
             elif result[7]:
                 routines.append(None)
-                ways.append(result[7])
-                blocks.begin(self.where(result), (self.tool,), loop=result[7] != 'if')
-            elif result[8] and ways:
-                ways[-1] = result[8]
-                (self.tool,) = blocks.branch((self.tool,))
+                blocks.begin(self.where(result), result[7], (self.tool,))
+            elif result[8]:
+                (self.tool,) = blocks.branch(result[8], (self.tool,))
+            elif result[10]:
+                blocks.leave((self.tool,))
             elif result[9] and routines and (around := routines.pop()) is not None:
                 # To define a routine moves nothing: what stands around it goes on as before.
                 self.program.new_piece()
                 self.tool = around
-            elif result[9] and ways:
-                (self.tool,) = blocks.end((self.tool,), always=ways.pop() == 'else')
+            elif result[9]:
+                (self.tool,) = blocks.end((self.tool,))
         self.settle(OTHER_TOOL, self.tools, tool=True)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])

@@ -51,13 +51,13 @@ class Server:
             return error.code, error.read().decode()
 
 
-def form(robot='ur5', files=(('data.csv', b'a,b\n1,2\n'),), **fields):
+def form(robot='ur5', files=(('data.csv', b'a,b\n1,2\n'),), model=(), **fields):
     """Return the body of a form and its type."""
     parts = []
     for name, value in {'robot': robot, **fields}.items():
         parts.append(f'Content-Disposition: form-data; name="{name}"\r\n\r\n{value}'.encode())
-    for name, content in files:
-        head = f'Content-Disposition: form-data; name="files"; filename="{name}"\r\n'
+    for field, name, content in (*(('files', *f) for f in files), *(('model', *f) for f in model)):
+        head = f'Content-Disposition: form-data; name="{field}"; filename="{name}"\r\n'
         parts.append((head + 'Content-Type: application/octet-stream\r\n\r\n').encode() + content)
     body = b''.join(b'--edge\r\n' + part + b'\r\n' for part in parts) + b'--edge--\r\n'
     return body, 'multipart/form-data; boundary=edge'

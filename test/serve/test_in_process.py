@@ -169,6 +169,13 @@ def test_what_is_no_recording_is_refused_in_a_sentence(app, tmp_path, kept):
     assert not list((tmp_path / 'jobs').iterdir())
 
 
+def test_two_diagnoses_for_one_program_are_refused_in_a_sentence(app, tmp_path):
+    one = Visitor(app, authorization='Bearer right')
+    files, model = (('seam.src', b'DEF a()\nEND\n'),), (('a.json', b'{}'), ('b.json', b'{}'))
+    assert 'Two diagnoses were dropped' in one.ask('/program', *form(files=files, model=model))
+    assert not list((tmp_path / 'jobs').iterdir())
+
+
 def test_who_one_is_goes_along_with_a_key(app, kept):
     one, other = (Visitor(app, address, authorization='Bearer right', x_forwarded_for='1.2.3.4')
                   for address in ('127.0.0.1', '10.0.0.2'))  # fmt: skip

@@ -245,6 +245,10 @@ async def save_program(
     if not names:
         raise DataError('choose a program first')
     models = _names(model, (*OTHERS, '.json'), 'a diagnosis nor a robot file', 2)
+    if sum(name.lower().endswith('.json') for name in models) > 1:
+        raise DataError(
+            'two diagnoses were dropped; drop the one that the program is corrected by'
+        )
     await _write(uploads, names, place / title(names))
     kept_as = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
     await _write(model, kept_as, beside)

@@ -52,6 +52,19 @@ def test_a_diagnosis_is_added_once_and_shown(diagnosed, url, capsys):
     assert capsys.readouterr().out == 'line 3\n'
 
 
+def test_that_another_diagnosis_of_a_recording_is_not_taken_is_told(
+    diagnosed, url, tmp_path, capsys
+):
+    content = json.loads((Path(diagnosed) / 'diagnosis.json').read_text())
+    content['verdict']['status'] = 'unknown'
+    (tmp_path / 'anew.json').write_text(json.dumps(content))
+    words = ['--cell', 'line 3', '--at', '2026-03-02', '--db', url]
+    assert main(['history', 'add', str(diagnosed), *words]) == 0
+    assert main(['history', 'add', str(tmp_path / 'anew.json'), *words]) == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert 'what was diagnosed then stays: identified: backlash of elbow_joint' in said
+
+
 def test_a_date_that_would_be_lost_is_told(diagnosed, url, capsys):
     words = ['history', 'add', str(diagnosed), '--cell', 'line 3', '--db', url, '--at']
     assert main([*words, '2026-03-02']) == 0

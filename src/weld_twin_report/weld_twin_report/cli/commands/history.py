@@ -20,7 +20,7 @@ from weld_twin_nodes.wording.quantities import counted, millimetres
 from weld_twin_nodes.wording.words import cause
 
 from ...history import Database, observations, words
-from ...history.entry import entry_of, instant
+from ...history.entry import Entry, entry_of, instant
 from ...history.runs import DONE, FAILED, REFUSED, Run
 from ...history.verifications import Verified, put_verified, verifications, verified_of
 from .. import limits, progress
@@ -60,12 +60,33 @@ def add(given: Given) -> int:
 
     with opened(given, make=True) as database:
         made = database.write(written)
-    for path, entry, number in zip(given.diagnosis, entries, made, strict=True):
-        said = 'was there already' if number is None else 'added'
+        said_of = [
+            'added' if number else _there_already(database, given.cell, entry)
+            for entry, number in zip(entries, made, strict=True)
+        ]
+    for path, entry, said in zip(given.diagnosis, entries, said_of, strict=True):
         print(f'{given.cell}: {path}, {entry.at.date()}, {entry.status}: {said}')
         if entry.at > datetime.now(timezone.utc) + timedelta(days=1):
             print(f'note: {entry.at.date()} is still to come by the clock of this computer')
     return 0
+
+
+def _there_already(database: Database, cell: str, entry: Entry | Verified) -> str:
+    """Return that a recording was there, and what is kept of it where that is something else."""
+    kept = () if isinstance(entry, Verified) else database.entries(cell)
+    for old in kept:
+        if old.recording == entry.recording and _verdict(old) != _verdict(entry):
+            return (
+                f'was there already, and what was diagnosed then stays: {": ".join(_verdict(old))}; '
+                'begin a history anew (--db) to have this instead'
+            )
+    return 'was there already'
+
+
+def _verdict(entry: Entry | Verified) -> list[str]:
+    """Return status and causes of a diagnosis."""
+    causes = '' if isinstance(entry, Verified) else words.causes_of(entry.effects)
+    return [text for text in (entry.status, causes) if text]
 
 
 def show(given: Given) -> int:

@@ -20,7 +20,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..arm.channels import Shift
-from ..arm.robot import Robot
+from ..arm.robot import STANDARD_GRAVITY, Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect, LinearEffect
@@ -45,13 +45,14 @@ def lightness(robot: Robot) -> float:
 
     Gears are as stiff as what they carry is heavy: a servo on a desk holds a newton metre, and yields a
     hundred times as much to one as a cobot does. The moment is that of links and payload at half of
-    the reach. Where no masses are known, 1.
+    the reach, wherever the arm hangs: no gear is softer for that. Where no masses are known, 1.
     """
-    if robot.mass is None:
-        return 1.0
-    weight = float((robot.mass.sum() + robot.payload_mass) * np.linalg.norm(robot.gravity))
+    mass = 0.0 if robot.mass is None else float(robot.mass.sum())
     reach = float(np.hypot(robot.a, np.where(robot.prismatic, 0.0, robot.d)).sum())
-    return max(_SAG / max(0.5 * weight * reach, 1e-3) / SOFTEST, 1.0)
+    if not mass * reach:
+        return 1.0
+    moment = 0.5 * (mass + robot.payload_mass) * np.linalg.norm(STANDARD_GRAVITY) * reach
+    return max(_SAG / float(moment) / SOFTEST, 1.0)
 
 
 class _Twin(TwinHooks):

@@ -29,7 +29,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.any_motion import same_error
 from ..hypotheses.search import Search
 from ..result import Family, Site
-from ..unseen.folds import TINY, growth, parts_of
+from ..unseen.folds import TINY, growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import believed
 
@@ -121,7 +121,7 @@ class _Case:
 
     def left(self, kept: Iterable[int]) -> Array:
         """Return the RMS error [m] of every part, shape (parts,)."""
-        return np.asarray(np.sqrt(self._mean(self.squares(kept))))
+        return np.sqrt(means(self.squares(kept), self.parts))
 
     def mean_square(self, kept: Iterable[int]) -> float:
         """Return the mean squared error of a part [m^2]."""
@@ -130,9 +130,6 @@ class _Case:
     def growth(self, kept: Iterable[int], less: Iterable[int]) -> Array:
         """Return by what share the error of every part grows to a lesser model, chance aside."""
         return growth(self.squares(kept), self.squares(less), self.parts)
-
-    def _mean(self, values: Array) -> Array:
-        return np.bincount(self.parts, weights=values) / np.bincount(self.parts)
 
     def _loss(self, kept: Iterable[int], less: Iterable[int]) -> float:
         """Return by what share the error grows in the median part."""

@@ -110,12 +110,12 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     """
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
-    one, two = _means(before, labels)[names], _means(after, others)[names]
+    one, two = means(before, labels)[names], means(after, others)[names]
     was, remaining = float(before.mean()), float(after.mean())
     return Gain((was - remaining) / max(was, 1e-300), steadiness(one, two), remaining**0.5)
 
 
-def _means(values: Array, labels: NDArray[Any]) -> Array:
+def means(values: Array, labels: NDArray[Any]) -> Array:
     """Return the mean of every part, by its number; those of parts that are not there mean nothing."""
     return np.asarray(np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))
 
@@ -150,9 +150,9 @@ def growth(before: Array, after: Array, parts: NDArray[np.intp]) -> Array:
     before, after: squared errors, shape (samples,) [m^2].
     parts: of every sample, shape (samples,).
     """
-    was, now, mean = (_means(values, parts) for values in (before, after, after - before))
+    was, now, mean = (means(values, parts) for values in (before, after, after - before))
     out = np.sqrt(now) / np.maximum(np.sqrt(was), TINY) - 1.0
-    spread = _means((after - before - mean[parts]) ** 2, parts)
+    spread = means((after - before - mean[parts]) ** 2, parts)
     error = np.sqrt(spread / np.maximum(np.bincount(parts) - 1, 1))
     return np.where((out < 0.0) & (mean > -error), 0.0, out)
 

@@ -112,7 +112,7 @@ def doubts(robot: Robot, effects: Sequence[Effect]) -> list[str]:
         if np.less(getattr(effect, 'compliance', 0.0), 0.0).any():
             out.append(
                 f'the compliance of {_called(effect)} is below zero: it moves against its load, '
-                'which no spring does, so check its sign'
+                'as only a controller that mends too much has it do; check its sign'
             )
     times = Counter(_all_but_size(effect) for effect in effects)
     out += [f'{what} is there {n} times, and all count' for (what, _), n in times.items() if n > 1]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -167,6 +168,12 @@ def test_what_was_corrected_is_not_corrected_twice(cell, tmp_path):
     written = (cell / 'better' / FILES[0]).read_bytes()
     said = weld_twin('correct', cell / 'better' / FILES[0], *words, cell / 'better')
     assert said.code == 2 and 'corrected already' in said.err and said.err.count('\n') == 1
+    assert (cell / 'better' / FILES[0]).read_bytes() == written
+    (tmp_path / 'backup').mkdir()
+    for name in FILES:
+        shutil.copy(cell / 'better' / name, tmp_path / 'backup')
+    said = weld_twin('correct', tmp_path / 'backup' / FILES[0], *words, cell / 'better')
+    assert said.code == 2 and 'holds the same as corrected' in said.err
     assert (cell / 'better' / FILES[0]).read_bytes() == written
     assert weld_twin('correct', cell / 'before', *words, tmp_path / 'bag').code == 0
     said = weld_twin('correct', tmp_path / 'bag', *words, tmp_path / 'again')

@@ -43,17 +43,35 @@ def run(given: Given) -> int:
 
 def _refuse_corrected(program: Path) -> None:
     """Refuse a program that a correction wrote: its points would be moved a second time."""
-    beside = program.resolve().with_name(RESULT)
+    if _moved(program.resolve().parent) == program.name:
+        raise _twice(program, f"as '{RESULT}' beside it says")
+
+
+def _refuse_written(program: Program, given: Given) -> None:
+    """Refuse a program that is what the folder of the result holds, from wherever it came back."""
+    out, texts = Path(given.out), {source.name: source.text for source in program.sources}
+    if _moved(out) in texts and all((out / name).is_file() for name in texts):
+        kept = {name: (out / name).read_bytes().decode('latin-1') for name in texts}
+        if kept == texts:
+            raise _twice(given.program, f"for '{out}' holds the same as corrected")
+
+
+def _moved(folder: Path) -> str | None:
+    """Return the name of the program of a folder whose points a correction moved; None for none."""
     try:
-        content = read_json(beside)
+        content = read_json(folder / RESULT)
     except DataError:
-        return
-    moved = any(move.get('moved_m') or move.get('turned_rad') for move in content.get('moves', ()))
-    if content.get('program') == program.name and moved:
-        raise DataError(
-            f"'{program}' was corrected already, as '{beside.name}' beside it says, and would be "
-            'corrected twice; give the program as it was before'
-        )
+        return None
+    moves = content.get('moves', ())
+    moved = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
+    return content.get('program') if moved else None
+
+
+def _twice(program: Path | str, why: str) -> DataError:
+    return DataError(
+        f"'{program}' was corrected already, {why}, and would be corrected twice; give the program "
+        'as it was before'
+    )
 
 
 def _corrected_bag(given: Given) -> int:
@@ -111,6 +129,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
 
+    _refuse_written(program, given)
     robot = context.robot
     length, angle = given.max_correction or LARGEST
     option = '--max-correction'

@@ -447,6 +447,12 @@ def test_what_goes_to_another_compensator_is_not_corrected(tmp_path, packages):
         planner.go('configure', 'activate')
         cell.wait(lambda: '/second, which takes what is sent' in planner.process.log, 'the other')
         planner.refused(planner.goal(sway()), 'it would correct twice')
+        cell.node.create_publisher(
+            POSE_OUT.message_class(), '/compensator/pose_out', POSE_OUT.offered.to_rclpy()
+        )
+        own = cell.node.get_fully_qualified_name()
+        beside = f'{own} publishes /compensator/pose_out, too'
+        cell.wait(lambda: beside in planner.process.log, 'the sender beside')
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ from .managed_node import ManagedNode
 from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of, say_doubts
 from .run_node import run
 from .settings import Setting
-from .source import full_names
+from .source import full_names, named
 
 COMPENSATOR_SETTINGS = (
     Setting(
@@ -153,6 +153,7 @@ class Compensator(ManagedNode):
         self._looks: LooksBeside | None = None
         self._judge = GoalJudge(self)
         self._out = self.offer(POSE_OUT)
+        self.partners.append(self._senders_beside)
         self._correction = self.offer(CORRECTION, awaited=False)
         self._audit = GoalAudit(self)
         self._frame = PlannedFrame(self.setting('base_frame'))
@@ -314,6 +315,14 @@ class Compensator(ManagedNode):
                     f'{name}, which takes what is sent, is a compensator: it would correct twice'
                 )
         return ''
+
+    def _senders_beside(self) -> list[str]:
+        """Return who else sends poses where this node does."""
+        own, topic = self.get_fully_qualified_name(), self._out.topic
+        return [
+            f'{named(name)} publishes {topic}, too: who takes it follows both by turns; end one of them'
+            for name in sorted(full_names(self.get_publishers_info_by_topic(topic)) - {own})
+        ]
 
     def _present(self) -> ProgramModel:
         assert self._model is not None

@@ -142,6 +142,31 @@ def test_a_move_from_rest_to_rest_takes_as_long_as_its_speed_says(ur5):
     assert begun - piece.motion.t[first] == pytest.approx(0.3, abs=1e-9)
 
 
+def test_a_move_too_short_for_its_speed_speeds_up_no_faster_than_others(ur5):
+    # 5 mm at 0.25 m/s^2: half of them up, half down.
+    start = wt.forward(ur5, START)
+    short = Move('linear', use(1), EYE, speed=0.05, stop=True)
+    program = MoveProgram(
+        (START, moved(start, 0.005, 0.0, 0.0)), ((Move('joint', use(0), EYE, stop=True), short),)
+    )
+    (piece,) = travel(ur5, program).pieces
+    first, last = (int(piece.ends[k]) for k in (0, 1))
+    taken = piece.motion.t[last] - piece.motion.t[first] - 0.3
+    assert taken == pytest.approx(2.0 * np.sqrt(0.005 / 0.25), abs=1e-9)
+
+
+def test_a_way_takes_as_long_in_many_moves_as_in_one(ur5):
+    start, taken = wt.forward(ur5, START), []
+    for count in (1, 20):
+        points = [moved(start, 0.04 * (k + 1) / count, 0.0, 0.0) for k in range(count)]
+        moves = (Move('linear', use(k + 1), EYE, speed=0.05, stop=False) for k in range(count))
+        program = MoveProgram((START, *points), ((Move('joint', use(0), EYE, stop=True), *moves),))
+        (piece,) = travel(ur5, program).pieces
+        taken.append(piece.motion.t[-1] - piece.motion.t[piece.ends[0]])
+    # It ends in a stop, though the last move does not say so.
+    np.testing.assert_allclose(taken, 0.04 / 0.05 + 0.2 + 0.3, atol=1e-9)
+
+
 def test_the_model_that_was_found_lies_within_what_is_expected():
     # Every drawn model is off by a millimetre; the one found is not, and is allowed as well.
     off = np.zeros((1, 2, 50, 3))

@@ -49,7 +49,7 @@ _STANDS = (
 _LEAST_TIME = 0.02
 """Shortest time [s] of a move."""
 _RISE = 0.2
-"""Time from a stop to full speed [s], while which speed rises evenly: a judgement, torches reach some
+"""Time from a stop to full speed [s], during which speed rises evenly: a judgement, torches reach some
 centimetres a second within a few tenths."""
 
 
@@ -294,42 +294,47 @@ def _turning(begin: Array, end: Array, share: Array) -> Array:
 
 
 def _joined(done: Sequence[tuple[Move, _Reached]]) -> Piece:
-    """Put the samples of moves together; the arm eases in and out where it stops."""
+    """Put the samples of moves together; the arm eases out of every stop, and into the next."""
     t, q, which, ends, vias = [], [], [], [], []
-    clock, count, rest = 0.0, 0, True
+    run: list[Array] = []
+    stopped, count = 0.0, 0
     for k, (move, reached) in enumerate(done):
         first = 0 if k == 0 else 1
-        times = clock + _eased(reached.t, rest, move.stop)[first:]
         vias.append(count + reached.via - first if reached.via >= 0 else -1)
-        t.append(times)
+        run.append(reached.t[first:] + (run[-1][-1] if run else 0.0))
         q.append(reached.q[first:])
-        clock = float(times[-1])
+        size = reached.t.size - first
         if move.stop or k == len(done) - 1:
-            stay = clock + max(move.dwell, _REST) * np.array([0.25, 0.5, 1.0])
-            t.append(stay)
+            moving = stopped + _eased(np.concatenate(run))
+            stay = moving[-1] + max(move.dwell, _REST) * np.array([0.25, 0.5, 1.0])
+            t += [moving, stay]
             q.append(np.repeat(reached.q[-1:], stay.size, axis=0))
-            clock = float(stay[-1])
-        rest = move.stop
-        before = count
-        count = sum(part.size for part in t)
-        which.append(np.full(count - before, k))
+            run, stopped = [], float(stay[-1])
+            size += stay.size
+        which.append(np.full(size, k))
+        count += size
         ends.append(count - 1)
     motion = JointMotion(np.concatenate(t), np.concatenate(q))
     moves = tuple(move for move, _ in done)
     return Piece(moves, motion, np.concatenate(which), np.array(ends), np.array(vias))
 
 
-def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
-    """Return the times of samples that full speed would pass at times (K,), slower near a stop."""
+def _eased(t: Array) -> Array:
+    """Return the times of samples from stop to stop that full speed would pass at times (K,)."""
     whole = t[-1]
-    rise = min(_RISE, float(whole))
-    late = from_rest * _late(t, rise) + to_rest * (0.5 * rise - _late(whole - t, rise))
-    return np.asarray(t + late)
+    # Between stops that are close an arm speeds up for half of the way, and is never as fast.
+    rising = 0.5 * min(_RISE, float(whole))
+    return np.asarray(t + _late(t, rising) + _late(whole, rising) - _late(whole - t, rising))
 
 
-def _late(t: Array, rise: float) -> Array:
-    """Return how much later a place is reached from a stop than at full speed, which takes t [s]."""
-    return np.where(t < 0.5 * rise, np.sqrt(2.0 * rise * t) - t, 0.5 * rise)
+def _late(t: Array, rising: float) -> Array:
+    """
+    Return how much later a place is reached from a stop than at full speed, which takes t [s].
+
+    rising: what full speed takes for the part of the way on which the arm speeds up [s].
+    """
+    near = np.minimum(t, rising)
+    return np.asarray(np.sqrt(2.0 * _RISE * near) - near)
 
 
 def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:

@@ -149,9 +149,9 @@ def fewer_models(request):
     """
     Let diagnoses draw fewer models in files without the mark `DRAWN`: a fifth of their time.
 
-    The next measurement, another fifth, is chosen from fewer. Those that leave out most kinds of
-    causes do not look at these at all, which is half of theirs.
-    Who leaves out a few asks for what is then held against what is found, in its place.
+    The next measurement, another fifth, is chosen from fewer. Tests that leave out most kinds of
+    causes do not look at these at all, which is half of their time; users' diagnoses still hold them
+    against what is found. Tests that leave out a few are about that, and look at all.
     """
     if request.node.get_closest_marker(DRAWN) is not None:
         yield

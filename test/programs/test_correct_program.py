@@ -401,3 +401,17 @@ def test_a_model_with_nothing_to_mend_moves_no_point_and_says_so(tmp_path):
     assert [move['moved_m'] for move in told['moves']] == pytest.approx(
         [0.0] * len(reaches), abs=1e-6
     )
+
+
+def test_slips_are_told_of_a_file_by_hand_and_not_of_what_a_diagnosis_leaves_open(
+    elbow_found, tmp_path
+):
+    def told(model):
+        words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'out')
+        return weld_twin('correct', MADE / 'bracket.script', *words).err
+
+    assert 'below zero' not in told(Path(elbow_found) / 'diagnosis.json')
+    spring = '- {effect: joint_compliance, joint: elbow_joint, compliance: -1.0e-6}\n'
+    (tmp_path / 'by_hand.yaml').write_text(2 * spring)
+    said = told(tmp_path / 'by_hand.yaml')
+    assert 'below zero' in said and 'is there 2 times' in said

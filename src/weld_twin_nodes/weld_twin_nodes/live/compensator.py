@@ -223,7 +223,8 @@ class Compensator(ManagedNode):
     def _take_model(self) -> None:
         self._model = loaded(self.robot, self.setting('model'))
         read = self._model.read
-        say_doubts(self, read.robot, read.effects)
+        # What a posterior leaves open lies on both sides of zero.
+        say_doubts(self, read.robot, read.effects if read.posterior is None else ())
         if read.posterior is None:
             self.remark(
                 'the model does not say how sure it is nor where it was recorded: neither is looked at'

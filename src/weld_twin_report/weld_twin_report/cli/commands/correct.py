@@ -136,7 +136,8 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     caps = Caps(_length(length, option), quantity(angle, ('deg', 'rad'), option))
     setup = 0 if given.setup is None else given.setup - 1
     model = correcting.program_model(robot, given.model, given.temperature, setup)
-    say_doubts(robot, model.effects, given.model)
+    if model.posterior is None:  # what a posterior leaves open lies on both sides of zero
+        say_doubts(robot, model.effects, given.model)
     content = diagnosis_of(given.model)
     made = correcting.corrected_program(
         program, context, model, caps, given.read_start(context), other_readings(content)

@@ -86,7 +86,7 @@ def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
         assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
 
 
-@pytest.mark.parametrize('language', ['krl', 'rapid', 'inform', 'fanuc-ls'])
+@pytest.mark.parametrize('language', ['krl', 'rapid', 'inform', 'fanuc-ls', 'urscript'])
 def test_a_program_that_was_cut_off_is_refused(language, tmp_path):
     robot, files, _, _ = CELLS[language]
     for name in files:

@@ -74,10 +74,10 @@ class UrscriptReader(Reader):
         self.tools: list[Frame] = []
 
     def read(self) -> Program:
+        calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
         self._declare()
         routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
         blocks = Blocks(self.program, (unclear('set_tcp'),))
-        calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
         words = [*_WORD.finditer(self.text), *calls]
         for result in sorted(words, key=lambda each: each.start()):
             if result.re is not _WORD:
@@ -110,7 +110,11 @@ class UrscriptReader(Reader):
         return self.program
 
     def _routines(self) -> list[tuple[str, Span]]:
-        """Return names and statements of the routines; of one that holds others, all of it."""
+        """
+        Return names and statements of the routines; of one that holds others, all of it.
+
+        Raises DataError: one of them, or a block, has no end.
+        """
         out, begun = list[tuple[str, Span]](), list[re.Match[str] | None]()
         for result in _WORD.finditer(self.text):
             if result[6]:
@@ -119,6 +123,9 @@ class UrscriptReader(Reader):
                 begun.append(None)
             elif result[9] and begun and (head := begun.pop()) is not None:
                 out.append((head[1], (head.end(), result.start())))
+        if begun:
+            where = self.source.where(len(self.text.rstrip()) - 1)
+            raise DataError(f"{where}: an 'end' is missing; is the file cut off?")
         return out
 
     def _declare(self) -> None:

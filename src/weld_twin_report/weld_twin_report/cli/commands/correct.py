@@ -21,6 +21,7 @@ from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
 from . import OF_PROGRAM
 
 RESULT = 'correction.json'
+CAPS = '--max-correction'
 NOISE = '0.03mm'
 """Of a measured coordinate unless given: a tracker or a measuring arm."""
 LARGEST = ('2mm', '1deg')
@@ -132,8 +133,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
     _refuse_written(program, given)
     robot = context.robot
     length, angle = given.max_correction or LARGEST
-    option = '--max-correction'
-    caps = Caps(_length(length, option), quantity(angle, ('deg', 'rad'), option))
+    caps = Caps(_length(length, CAPS), quantity(angle, ('deg', 'rad'), CAPS))
     setup = 0 if given.setup is None else given.setup - 1
     model = correcting.program_model(robot, given.model, given.temperature, setup)
     if model.posterior is None:  # what a posterior leaves open lies on both sides of zero

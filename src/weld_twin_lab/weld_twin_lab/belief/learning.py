@@ -48,7 +48,7 @@ FEWEST_NAMED = 30
 """Examples in which a family is named alone from which on that is a feature."""
 DIGITS = 4
 """Significant digits of a weight."""
-LEAST = 0.1
+LEAST = 0.2
 """
 Nats that a feature adds at the most over all its range, up to which it is left out: nobody can see it
 in a probability, and each weight that is left is one more to read.

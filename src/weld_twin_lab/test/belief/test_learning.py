@@ -126,7 +126,7 @@ def test_an_answer_is_learned_from_its_name_as_new_weights_report_it():
     p = np.exp([e.features['names'] for e in now])
     right = np.array([e.right for e in now])
     assert p[right].mean() > 0.75 > 0.4 > p[~right].mean()
-    assert [e.features['least name'] for e in now] == pytest.approx(np.log(p / (1.0 - p)))
+    assert [e.features['least name'] for e in now] == pytest.approx([odds(one) for one in p])
     # So what is learned of such answers tells them apart as the names do.
     weights = learned(rows, {})['statements']['answer, named']['weights']
     assert weights['names']['weight'] + weights['least name']['weight'] > 0.5

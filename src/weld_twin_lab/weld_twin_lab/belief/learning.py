@@ -50,8 +50,8 @@ DIGITS = 4
 """Significant digits of a weight."""
 LEAST = 0.2
 """
-Nats that a feature adds at the most over all its range, up to which it is left out: nobody can see it
-in a probability, and each weight that is left is one more to read.
+Nats that a feature adds at the most over all its range, up to which it is left out: it moves no
+probability by more than a twentieth, and each weight that is left is one more to read.
 """
 
 

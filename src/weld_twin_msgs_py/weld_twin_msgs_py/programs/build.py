@@ -291,7 +291,12 @@ def signs_kept(turn: int) -> Astray:
     return of
 
 
-def half_turns_kept(controller: Controller) -> Any:
+def half_turns_kept(kind: Kind, point: Point) -> Astray | None:
+    """Return what tells the axes that leave their counted turns; of joint moves to poses alone."""
+    return _half_turns_kept if kind == 'joint' and not point.notation.joints else None
+
+
+def _half_turns_kept(controller: Controller) -> Any:
     """Return what tells the axes 1, 4 and 6 that pass 180 degrees, where flags count their turns."""
 
     def astray(before: Array, after: Array) -> tuple[int, ...]:

@@ -197,7 +197,6 @@ class FanucReader(Reader):
     def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
         assert point is not None
         tool, base = self.frames[point]
-        flags = kind == 'joint' and not self.program.points[point].notation.joints
         step = Step(
             kind,
             where,
@@ -208,7 +207,7 @@ class FanucReader(Reader):
             _speed(kind, tail),
             re.search(r'\bFINE\b', tail) is not None,
             along=re.search(r'\bCOORD\b', tail) is not None,
-            astray=half_turns_kept if flags else None,
+            astray=half_turns_kept(kind, self.program.points[point]),
         )
         self.program.add(step)
 

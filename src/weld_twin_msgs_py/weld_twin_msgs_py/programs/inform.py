@@ -163,7 +163,6 @@ class InformReader(Reader):
     def _step(self, kind: Kind, where: str, point: int, rest: str) -> Step:
         level = re.search(r'\bPL=(\d+)', rest)
         tool, base = self.frames[point]
-        flags = kind == 'joint' and not self.program.points[point].notation.joints
         return Step(
             kind,
             where,
@@ -173,7 +172,7 @@ class InformReader(Reader):
             base,
             _speed(kind, rest),
             level is not None and level[1] == '0',
-            astray=half_turns_kept if flags else None,
+            astray=half_turns_kept(kind, self.program.points[point]),
         )
 
 

@@ -208,9 +208,10 @@ class Given(argparse.Namespace):
         values = np.array(_numbers(self.start, '--start'))
         if values.size != robot.n:
             raise DataError(f'--start needs {robot.n} joint positions, got {values.size}')
-        q = context.degrees().value(values.tolist())
         if context.controller.external:
             q = np.where(robot.prismatic, values * 1e-3, np.radians(values))
+        else:
+            q = context.degrees().value(values.tolist())
         robot.check_positions(q)
         return np.asarray(q)
 

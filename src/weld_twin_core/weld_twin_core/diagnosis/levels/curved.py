@@ -110,11 +110,9 @@ def choose_model(
     nothing = result.dense and verdict.status == 'none'
     if verdict.status != 'unknown' and not nothing:
         return result, unseen, shrink, verdict
-    if alternative is not None:
-        there = alternative.unseen
-        if _worth(unseen, there, verdict, beliefs):
-            result, unseen = alternative.found, there
-            shrink = held_out_shrink(result, unseen, holdout, beliefs)
+    if alternative is not None and _worth(unseen, alternative, verdict, beliefs):
+        result, unseen = alternative.found, alternative.unseen
+        shrink = held_out_shrink(result, unseen, holdout, beliefs)
     least = 1.0 if verdict.sets else beliefs.better
     if shrink.rms_after_m <= least * shrink.rms_before_m and not nothing:
         return result, unseen, shrink, verdict
@@ -128,12 +126,9 @@ def choose_model(
     return result, unseen, shrink, replace(verdict, sets=())
 
 
-def _worth(named: Unseen, there: Unseen, verdict: Verdict, beliefs: Beliefs) -> bool:
-    """
-    Return whether the model has curves: for names that do not stand, or clearly beside.
-
-    there: with the curves.
-    """
+def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
+    """Return whether the model has curves: for names that do not stand, or clearly beside."""
+    there = alternative.unseen
     before, after = named.squares(named.whole), there.squares(there.whole)
     if not verdict.sets:
         return float(after.mean()) <= beliefs.curve_room**2 * float(before.mean())

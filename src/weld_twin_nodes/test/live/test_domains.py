@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from contextlib import ExitStack, contextmanager
 
 import pytest
 import rclpy
@@ -16,6 +17,9 @@ from rclpy.node import Node
 from weld_twin_nodes.harness.process import DOMAINS, own_domain
 
 pytestmark = pytest.mark.cells
+
+OTHER = 102
+"""A domain that no cell of a test is given."""
 
 HOLD = """
 import os, sys
@@ -53,18 +57,29 @@ def test_processes_with_other_folders_for_temporary_files_get_other_domains(same
         other.communicate()
 
 
-def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same_start):
-    with own_domain() as free:
-        pass
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=free)
-    stranger = Node('stranger', context=context)
-    try:
+@pytest.mark.parametrize('elsewhere', [0, 6])
+def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same_start, elsewhere):
+    with ExitStack() as strangers:
+        for _ in range(elsewhere):  # a process numbers its participants of all domains in one row
+            strangers.enter_context(_stranger(OTHER))
+        with own_domain() as free:
+            pass
+        strangers.enter_context(_stranger(free))
         with own_domain() as ours:
             assert ours in DOMAINS
             assert ours != free
+
+
+@contextmanager
+def _stranger(domain):
+    """Have a node speak in a domain without holding its lock."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = Node('stranger', context=context)
+    try:
+        yield
     finally:
-        stranger.destroy_node()
+        node.destroy_node()
         context.try_shutdown()
 
 

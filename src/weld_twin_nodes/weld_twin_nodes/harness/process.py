@@ -30,8 +30,9 @@ FIRST, APART = 7400, 250
 """First port of domain 0, and how many ports a domain has: section 9.6.1 of the RTPS standard."""
 LOCK_PORT = 5
 """Port of a domain that no participant takes: two are for multicast, its participants' begin at ten."""
-TAKEN = range(10, 20)
-"""Ports of the first five participants of a domain: one of them is there as long as any is new."""
+TAKEN = range(10, APART)
+"""Ports of a domain's participants: all of them, since a process numbers those of all its domains in
+one row, so that its first one of a domain may have any number."""
 
 
 @contextmanager

@@ -13,11 +13,12 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.evidence import Evidence
 from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import _Case, weighed_families
 from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
+from weld_twin_core.diagnosis.verdict.decision import decide
 from weld_twin_core.twin.twin import Twin
 
 

@@ -9,7 +9,7 @@ from diagnosis_cells import HOME, all_but, effect, known_scale, tiny
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.hypotheses.starts import started
+from weld_twin_core.diagnosis.algebra.starts import started
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 

@@ -6,8 +6,9 @@ import pytest
 from diagnosis_cells import effect, tiny
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.evidence import Alternative
 from weld_twin_core.diagnosis.hypotheses import search
-from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative, fit_alternatives
+from weld_twin_core.diagnosis.hypotheses.alternatives import fit_alternatives
 from weld_twin_core.diagnosis.result import Site
 
 TRUE = (

@@ -13,13 +13,13 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.algebra.columns import Columns, Maker
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
+from weld_twin_core.diagnosis.algebra.starts import started
 from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.evidence import Verdict
 from weld_twin_core.diagnosis.hypotheses.search import search
-from weld_twin_core.diagnosis.hypotheses.starts import started
 from weld_twin_core.diagnosis.levels.curved import choose_model
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan

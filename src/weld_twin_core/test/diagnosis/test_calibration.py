@@ -20,10 +20,8 @@ from weld_twin_core.diagnosis.calibration.features import (
     part_of_a_wave,
 )
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
-from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
+from weld_twin_core.diagnosis.evidence import Alternative, Evidence, Row, Verdict
 from weld_twin_core.diagnosis.result import Cause, Site, Structure
-from weld_twin_core.diagnosis.verdict.decision import Verdict
-from weld_twin_core.diagnosis.verdict.evidence import Evidence, Row
 
 PLAY = Site('backlash', 'elbow_joint')
 

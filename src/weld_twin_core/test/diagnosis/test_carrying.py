@@ -14,10 +14,9 @@ from small_arm import small_arm
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
+from weld_twin_core.diagnosis.evidence import Alternative
+from weld_twin_core.diagnosis.hypotheses.borne_out import borne_out
 from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.diagnosis.unseen import held_out_shrink as room
-from weld_twin_core.diagnosis.unseen.held_out_shrink import borne_out
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.twin.posterior import expected_poses
 
@@ -137,44 +136,41 @@ class Found:
     small: object = field(default_factory=lambda: fitted(TWIST, PLAY))
 
 
-def parted(monkeypatch, *candidate_set):
+def parted(*candidate_set):
     """Return what is left of a candidate set, given sites, probabilities and what each leaves [m]."""
-    monkeypatch.setattr(room, 'left_on', lambda found, holdout, beliefs: found.final.left)
     alternatives = tuple(
         Alternative(site, 0.0, fitted(site, left=left), p) for site, p, left in candidate_set
     )
-    found = borne_out(Found((alternatives,)), ['held out'], Beliefs())
+    found = borne_out(Found((alternatives,)), lambda found: found.final.left, Beliefs())
     return {r.site: r.probability for r in found.candidate_sets[0]}
 
 
-def test_an_alternative_that_fails_where_the_leader_holds_is_not_its_like(monkeypatch):
-    told = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.2, 1.06e-4), (PLAY, 0.2, 1e-4))
+def test_an_alternative_that_fails_where_the_leader_holds_is_not_its_like():
+    told = parted((TWIST, 0.6, 1e-4), (BASE, 0.2, 1.06e-4), (PLAY, 0.2, 1e-4))
     assert told == pytest.approx({TWIST: 0.75, PLAY: 0.25})
 
 
-def test_an_alternative_that_leaves_five_percent_more_is_still_alike(monkeypatch):
-    told = parted(monkeypatch, (TWIST, 0.6, 1e-4), (BASE, 0.4, 1.04e-4))
+def test_an_alternative_that_leaves_five_percent_more_is_still_alike():
+    told = parted((TWIST, 0.6, 1e-4), (BASE, 0.4, 1.04e-4))
     assert told == {TWIST: 0.6, BASE: 0.4}
 
 
-def test_a_leader_that_fails_itself_rules_nothing_out(monkeypatch):
-    told = parted(monkeypatch, (TWIST, 0.6, 3e-4), (BASE, 0.4, 1e-4))
+def test_a_leader_that_fails_itself_rules_nothing_out():
+    told = parted((TWIST, 0.6, 3e-4), (BASE, 0.4, 1e-4))
     assert told == {TWIST: 0.6, BASE: 0.4}
 
 
-def test_what_looked_likelier_here_and_fails_there_is_out_however_sure_it_was(monkeypatch):
-    told = parted(monkeypatch, (BASE, 0.9, 3e-4), (TWIST, 0.08, 1e-4), (PLAY, 0.02, 9e-4))
+def test_what_looked_likelier_here_and_fails_there_is_out_however_sure_it_was():
+    told = parted((BASE, 0.9, 3e-4), (TWIST, 0.08, 1e-4), (PLAY, 0.02, 9e-4))
     assert told == pytest.approx({TWIST: 0.8, PLAY: 0.2})
 
 
-def test_a_sure_leader_and_a_diagnosis_without_held_out_data_are_not_asked():
+def test_a_sure_leader_is_not_asked():
     candidate_sets = (
         (Alternative(TWIST, 0.0, fitted(TWIST), 0.9), Alternative(BASE, 0.0, fitted(BASE), 0.1)),
     )
-    assert (
-        borne_out(Found(candidate_sets), ['held out'], Beliefs()).candidate_sets == candidate_sets
-    )
-    unsure = Found(
-        ((Alternative(TWIST, 0.0, fitted(TWIST), 0.6), Alternative(BASE, 0.0, fitted(BASE), 0.4)),)
-    )
-    assert borne_out(unsure, [], Beliefs()) == unsure
+
+    def never(found):
+        raise AssertionError('held-out data were asked')
+
+    assert borne_out(Found(candidate_sets), never, Beliefs()).candidate_sets == candidate_sets

@@ -13,10 +13,9 @@ from types import SimpleNamespace
 import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
+from weld_twin_core.diagnosis.evidence import Alternative, Evidence, Left, Scatter
 from weld_twin_core.diagnosis.result import Family, Site, Structure
-from weld_twin_core.diagnosis.verdict.decision import Left, decide
-from weld_twin_core.diagnosis.verdict.evidence import Evidence, Scatter
+from weld_twin_core.diagnosis.verdict.decision import decide
 
 ELBOW, WRIST = 'elbow_joint', 'wrist_1_joint'
 PLAY, OFFSET = Site('backlash', ELBOW), Site('joint_offset', WRIST)

@@ -14,14 +14,13 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.evidence import Evidence, Verdict
 from weld_twin_core.diagnosis.levels.curved import locate_gap, no_noise
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
 from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import Verdict
-from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.effects.curves import JointCurve, basis
 
 NOISE = 2e-5

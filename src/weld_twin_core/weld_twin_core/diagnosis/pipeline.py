@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import sqrt
 
 from ..arm.robot import Robot
@@ -19,9 +20,11 @@ from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
+from .evidence import Row, Search, beyond_doubt
 from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
-from .hypotheses.search import Search, search
+from .hypotheses.borne_out import borne_out
+from .hypotheses.search import search
 from .hypotheses.selection import implausible
 from .levels.curved import choose_model, curved, locate_gap, no_noise
 from .levels.gathered import gathered
@@ -34,11 +37,10 @@ from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
 from .soundness.richness import refuse_reused
-from .unseen.held_out_shrink import borne_out, held_out_shrink
+from .unseen.held_out_shrink import held_out_shrink, left_on
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
-from .verdict.decision import LIKELIER, beyond_doubt, decide
-from .verdict.evidence import Row
+from .verdict.decision import LIKELIER, decide
 
 Progress = Callable[[str], None]
 
@@ -197,7 +199,7 @@ def _conclude(
 ) -> Diagnosis:
     """Return the diagnosis of what was found."""
     holdout = examined.mended(holdout)
-    result = borne_out(result, holdout, beliefs)
+    result = _borne_out(result, holdout, beliefs)
     result, unseen, leftover, with_strays = _without_strays(result, beliefs)
     progress('looked for what is left')
     residuals = result.problem.residuals(result.final.model)
@@ -227,6 +229,13 @@ def _conclude(
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
+
+
+def _borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
+    """Return what was found as held-out recordings, if there are any, bear it out."""
+    if not holdout:
+        return result
+    return borne_out(result, partial(left_on, holdout=holdout, beliefs=beliefs), beliefs)
 
 
 def _without_strays(result: Search, beliefs: Beliefs) -> tuple[Search, Unseen, Structure, float]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..effects.effect import Effect
 from ..recording import Recording
 from ..twin.posterior import Posterior, as_dict
 from .algebra.problem import Model
+from .algebra.problem import Site as Site
 
 SCHEMA = 'weld_twin/diagnosis/2'
 NAMING = ('identified', 'ambiguous')
@@ -149,26 +150,6 @@ class Changed:
             'value': next(iter(value.values())) if lone else value,
             'std': next(iter(self.std.values())) if lone else self.std,
         }
-
-
-class Site(NamedTuple):
-    """A family on a joint (None: the robot as a whole)."""
-
-    effect: str
-    joint: str | None
-
-    @classmethod
-    def of(cls, effect: Effect) -> Site:
-        """Return where an effect is at work."""
-        return cls(effect.name, effect.site)
-
-    def __str__(self) -> str:
-        """Return it as people read it."""
-        return f'{self.effect} of {self.joint}' if self.joint else self.effect
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values in the public schema."""
-        return self._asdict()
 
 
 @dataclass(frozen=True)
@@ -528,7 +509,7 @@ class Diagnosis:
     families: tuple[Family, ...] = ()
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
-    """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
+    """What the verdict was drawn from, `evidence.Evidence`, to draw it anew."""
     statements: tuple[object, ...] = ()
     """What is said, on what evidence and how probable: `calibration.calibrated.Statement`."""
     posterior: Posterior | None = None

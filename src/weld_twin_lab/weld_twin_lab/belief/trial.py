@@ -11,8 +11,7 @@ from typing import Any
 
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.diagnosis.hypotheses.alternatives import Alternative
-from weld_twin_core.diagnosis.verdict.evidence import Evidence
+from weld_twin_core.diagnosis.evidence import Alternative, Evidence
 from weld_twin_core.effects.registry import effects_from_list
 from weld_twin_core.recording import Recording
 

@@ -477,6 +477,26 @@ class Scale:
         return [weight == 0.0 for weight in self.weights]
 
 
+class Site(NamedTuple):
+    """A family on a joint (None: the robot as a whole)."""
+
+    effect: str
+    joint: str | None
+
+    @classmethod
+    def of(cls, effect: Effect) -> Site:
+        """Return where an effect is at work."""
+        return cls(effect.name, effect.site)
+
+    def __str__(self) -> str:
+        """Return it as people read it."""
+        return f'{self.effect} of {self.joint}' if self.joint else self.effect
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values in the public schema."""
+        return self._asdict()
+
+
 class Change(NamedTuple):
     """What one recording has that the first has not, counted from the first."""
 

@@ -90,3 +90,13 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
             if kind.applicable(view, joint) is None:
                 out |= {e.key: e for e in kind.search.small(view, joint, 1) if e.on in on}
     return list(out.values())
+
+
+def candidate_kinds(align: frozenset[str]) -> list[type[Effect]]:
+    """Return the kinds of effect that may be a cause, in the order of their stages."""
+    kinds = [
+        kind
+        for kind in REGISTRY.values()
+        if kind.traits.cause and not kind.traits.dated and kind.traits.fitted_with not in align
+    ]
+    return sorted(kinds, key=lambda kind: (kind.stage, kind.name))

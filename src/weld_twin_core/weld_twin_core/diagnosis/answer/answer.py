@@ -13,16 +13,15 @@ import numpy as np
 
 from ...twin.posterior import Posterior
 from ..advice import Limits, actions
+from ..algebra.any_motion import never_parted
 from ..algebra.fit import trusted
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
 from ..calibration.features import of_form
+from ..evidence import Alternative, Evidence, Left, Search, Verdict
 from ..frames.aligned import NOT_TOLD, other_causes
 from ..frames.changes import list_changes, list_undetectable
-from ..hypotheses.alternatives import Alternative
-from ..hypotheses.any_motion import never_parted
-from ..hypotheses.search import Search
 from ..levels.causes import causes, contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
@@ -44,8 +43,6 @@ from ..soundness.efforts import compared
 from ..soundness.gate import Examined
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
-from ..verdict.decision import Left, Verdict
-from ..verdict.evidence import Evidence
 from .contact_spreads import contact_spreads
 from .named_effects import named_effects, with_intervals
 from .next_step import next_step

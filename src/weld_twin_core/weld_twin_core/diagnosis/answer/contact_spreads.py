@@ -12,7 +12,7 @@ from ...effects.plausible import spreads as spreads_of
 from ..algebra.definite import outside, span_of
 from ..algebra.problem import Model, Problem
 from ..algebra.still_joints import plain_causes
-from ..hypotheses.search import Search
+from ..evidence import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen
 

@@ -29,12 +29,11 @@ from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed
 from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
-from ..hypotheses.search import Search
-from ..hypotheses.starts import profile
+from ..algebra.starts import profile
+from ..evidence import Search, Verdict
 from ..levels.causes import covering
 from ..result import Cause, Found, Site
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.decision import Verdict
 
 _LEAST_SHARE = 1e-3
 """Share of the rows that counts as independent at the least; keeps a division finite."""

@@ -22,11 +22,10 @@ from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
 from ..algebra.still_joints import narrow
-from ..hypotheses.search import Search
+from ..evidence import Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part
 from ..unseen.groups import Group
-from ..verdict.decision import Verdict
 
 _TOUCHED = 4
 """Explanations compared where contacts measured: every touch that could be made is tried with each."""

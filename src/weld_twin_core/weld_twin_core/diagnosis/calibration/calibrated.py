@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ..beliefs import Beliefs
+from ..evidence import Evidence, Row, Verdict, marginal
 from ..result import NAMING, Cause, Family
-from ..verdict.decision import Verdict
-from ..verdict.evidence import Evidence, Row, marginal
 from .features import (
     TOLD_AS,
     Numbers,

@@ -18,9 +18,8 @@ import numpy as np
 
 from ...arrays import Array
 from ..beliefs import Beliefs
+from ..evidence import Evidence, Left, Row
 from ..result import Cause, Family
-from ..verdict.decision import Left
-from ..verdict.evidence import Evidence, Row
 
 Numbers = dict[str, float]
 FAR = 1e3

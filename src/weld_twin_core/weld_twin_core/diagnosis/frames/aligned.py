@@ -21,10 +21,10 @@ from ...arrays import Array
 from ...contacts import places
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
-from ...errors import DataError
-from ...recording import Measurements, Recording
+from ...recording import Recording
 from ..algebra.fit import fit
-from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
+from ..algebra.places import by_place, posed
+from ..algebra.problem import Model, Problem, frames_named, usable
 from .alignment import initial_frames
 
 NEAR = 0.02
@@ -37,8 +37,6 @@ NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperatur
 """What effects may depend on that no contact tells of."""
 NOT_TOLD = 'contacts do not tell of it'
 """Why such an effect is not considered."""
-FEWEST = 2
-"""Postures that one contact needs at the least: of a single one its unknown place takes everything."""
 
 
 def aligned(
@@ -66,17 +64,12 @@ def aligned(
     align = frames_named(align)
     pairs = list(zip(given or range(len(recordings)), recordings, strict=True))
     tracked = [(k, usable(r)) for k, r in pairs if r.contacts is None]
-    touched = [(k, part) for k, r in pairs if r.contacts is not None for part in _by_place(r)]
+    touched = [(k, part) for k, r in pairs if r.contacts is not None for part in by_place(r)]
     parts = tuple(k for k, _ in (*tracked, *touched)) if touched else ()
     model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
     counted = next((r.counted for r in recordings if r.counted is not None), None)
     model = replace(model, given=parts, counted=counted)
-    filled = [_filled(r, model, k) for k, (_, r) in enumerate(touched, len(tracked))]
-    anchor = Anchor(model.bases, model.robot.T_flange_tool)
-    every = (*(r for _, r in tracked), *filled)
-    problem = Problem(every, align, anchor, given=parts).touching(model)
-    if problem.untracked and not problem.placed:
-        problem = replace(problem, align=align & {'tool'})
+    problem = posed([r for _, r in tracked], [r for _, r in touched], model, align)
     return problem, model
 
 
@@ -143,33 +136,6 @@ def other_causes(problem: Problem) -> tuple[str, ...]:
         if (kind.traits.place == 'base' and not problem.placed)
         or kind.traits.depends_on in NO_CONTACT
     )
-
-
-def _by_place(recording: Recording) -> list[Recording]:
-    """Return the contacts of every place as a recording of its own; refuse too few of one."""
-    contacts = recording.touched
-    for label in dict.fromkeys(contacts.labels):
-        if contacts.of(label).size < FEWEST and not contacts.artefact.named(label).known:
-            raise DataError(
-                f'contact {label!r} of {recording.name} has {contacts.of(label).size} postures; '
-                f'touch it in at least {FEWEST}'
-            )
-    out = []
-    for index in contacts.parts():
-        part = contacts.take(index)
-        motion = replace(
-            recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
-        )
-        name = '+'.join(contact.label for contact in part.artefact.contacts)
-        out.append(replace(recording, name=name, joints=motion, contacts=part))
-    return out
-
-
-def _filled(recording: Recording, model: Model, k: int) -> Recording:
-    """Return the recording with what its contacts measure at the model, for pictures."""
-    points = model.twin(k).poses(recording, recording.joints.t).position
-    where = places(recording.touched, points).foot(points)
-    return recording.with_measured(Measurements(recording.joints.t, where))
 
 
 def _tool(recordings: Sequence[Recording], model: Model) -> Array:

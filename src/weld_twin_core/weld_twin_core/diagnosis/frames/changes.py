@@ -23,6 +23,7 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
+from ..algebra.any_motion import constant, of_no_size
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
 from ..algebra.definite import unit_diagonal
 from ..algebra.fit import (
@@ -39,8 +40,7 @@ from ..algebra.fit import (
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Change, Model, Problem, Scale
 from ..beliefs import Beliefs
-from ..hypotheses.any_motion import constant, of_no_size
-from ..hypotheses.search import Search
+from ..evidence import Search
 from ..result import Changed, Site
 
 ROWS = 9000

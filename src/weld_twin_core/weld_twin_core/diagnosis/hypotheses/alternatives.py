@@ -15,65 +15,23 @@ than a constant here, as its joint does not move. None of these counts for more 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.registry import REGISTRY
+from ..algebra.any_motion import constant, of_no_size, same_error
 from ..algebra.fit import Fit
+from ..algebra.seed_systems import Choice, Part, Role, evidence
+from ..algebra.workspace import Workspace
+from ..evidence import Alternative, CandidateSet
 from ..result import Site
-from .any_motion import constant, of_no_size, same_error
 from .other_sets import Other
-from .seed_systems import Choice, Part, Role, evidence
-from .selection import Workspace, backward, implausible, sites
+from .selection import backward, implausible, sites
 
 SHORTLIST, BESIDE = 7, 3
 """Alternatives that may be in the model, and others of each role, fitted at most; bounds the time."""
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """A unit in the place of a found effect: its evidence, and the fit with it."""
-
-    site: Site
-    log_bayes: float
-    fit: Fit
-    probability: float = 0.0
-    """Its share of the evidence in this place."""
-    behind: float = 0.0
-    """By how much a family that was taken out is ahead in this place; 0 of none."""
-    role: Role = Role.FOUND
-    """Whether it may be in the model."""
-    ahead: float = 0.0
-    """By how much evidence it is ahead of all that may be in the model, where it may not."""
-
-    @property
-    def place(self) -> str:
-        """Return where it is at work."""
-        effect = self._fitted
-        return str(self.site.joint) if effect is None else effect.at
-
-    @property
-    def dependence(self) -> str:
-        """Return what it depends on."""
-        effect = self._fitted
-        return REGISTRY[self.site.effect].traits.depends_on if effect is None else effect.on
-
-    @property
-    def orders(self) -> Array:
-        """Return the orders of the waves that it is a sum of, shape (K,) [1/rev]; none of others."""
-        effect = self._fitted
-        return np.zeros(0) if effect is None else np.asarray(effect.search.orders())
-
-    @property
-    def _fitted(self) -> Effect | None:
-        return next((e for e in self.fit.model.found if Site.of(e) == self.site), None)
-
-
-CandidateSet = tuple[Alternative, ...]
-"""An effect found and its alternatives, most probable first; their weights add up to one."""
 
 
 def fit_alternatives(

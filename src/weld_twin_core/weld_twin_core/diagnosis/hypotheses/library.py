@@ -5,60 +5,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ...effects.effect import Effect, Stage
-from ...effects.registry import REGISTRY
 from ...twin.features import joints_of
+from ..algebra.any_motion import set_instead
 from ..algebra.columns import Columns, Maker, Piece
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import REASON, hardly_moves, moved_most, separable_orders
+from ..algebra.seed_systems import Role, SeedSystems, Unit
+from ..algebra.still_joints import (
+    REASON,
+    candidate_kinds,
+    hardly_moves,
+    moved_most,
+    separable_orders,
+)
+from ..algebra.workspace import Library
 from ..result import Site
-from .any_motion import set_instead
-from .seed_systems import Part, Role, SeedSystems, Unit, parts
 
 EXCLUDED = 'excluded by the user'
 FEW = 2
 """Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
 one does, as all stand still."""
-
-
-@dataclass(frozen=True, eq=False)
-class Library:
-    """Columns of every unit."""
-
-    columns: Columns
-    """All of them, in the order of their numbers."""
-    systems: SeedSystems
-    """The normal matrix of every seed."""
-    units: tuple[Unit, ...]
-    absent: dict[str, str]
-    """Why a family is not considered, by name."""
-
-    @cached_property
-    def seeds_of(self) -> dict[Part, list[int]]:
-        """Return the seeds of every part, and of every effect as a whole, counted over the units."""
-        out: dict[Part, list[int]] = {}
-        for k, seed in enumerate(seed for unit in self.units for seed in unit.seeds):
-            for part in {*parts(seed), Part(Site.of(seed))}:
-                out.setdefault(part, []).append(k)
-        return out
-
-
-def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
-    """Return the kinds of effect that may be a cause, in the order of their stages."""
-    kinds = [
-        kind
-        for kind in REGISTRY.values()
-        if kind.traits.cause
-        and not kind.traits.dated
-        and kind.name not in exclude
-        and kind.traits.fitted_with not in align
-    ]
-    return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
@@ -69,7 +38,7 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     against what is found, in its place.
     """
     shelf = _Shelf(problem, model, scale, exclude)
-    for kind in candidate_kinds((), problem.align):
+    for kind in candidate_kinds(problem.align):
         for joint in joints_of(kind, model.robot):
             shelf.add(kind, joint)
     for sudden in problem.dated:

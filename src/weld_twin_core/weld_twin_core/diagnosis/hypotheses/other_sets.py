@@ -23,10 +23,10 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.definite import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
+from ..algebra.seed_systems import SINGULAR, Choice, Part, SeedSystems, evidence, parts, ranking
+from ..algebra.workspace import Library, Workspace, merged
 from ..result import Site
-from .library import Library
-from .seed_systems import SINGULAR, Choice, Part, SeedSystems, evidence, parts, ranking
-from .selection import Workspace, backward, implausible, merged, sites
+from .selection import backward, implausible, sites
 
 BEGUN = 6
 """Effects that a set is begun with, in turn; bounds the time."""

@@ -5,27 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
-from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale, without_strays
+from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.workspace import Workspace
 from ..beliefs import Beliefs
+from ..evidence import CandidateSet, Search
 from ..result import Site
-from .alternatives import CandidateSet, fit_alternatives, with_leads
-from .library import Library, build
+from .alternatives import fit_alternatives, with_leads
+from .library import build
 from .other_sets import AHEAD, Sets, reconsidered
-from .selection import (
-    Workspace,
-    backward,
-    forward,
-    implausible,
-    possible,
-    possible_part,
-    sites,
-)
+from .selection import backward, forward, implausible, possible, possible_part, sites
 
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
@@ -36,57 +29,6 @@ ROUNDS = 3
 SWAPS = 3
 """Times that an alternative that is clearly ahead may take an effect's place."""
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Search:
-    """What a search found."""
-
-    problem: Problem
-    scale: Scale
-    """All measurements, with the final noise and weights."""
-    baseline: Fit
-    """Frames and known effects only."""
-    final: Fit
-    precision: Array
-    """Prior precision of the final fit's coordinates, shape (K,)."""
-    work: Workspace
-    """The library that alternatives are drawn from."""
-    small: Fit
-    """The final fit on the workspace's measurements."""
-    candidate_sets: tuple[CandidateSet, ...]
-    """For every found effect itself and its alternatives; empty when many were fitted together."""
-    crowded: bool = False
-    """Whether so many units came one by one that the selection among them was not finished."""
-    dense: bool = False
-    """Whether many small errors were fitted together."""
-    refused: tuple[Effect, ...] = ()
-    """What would explain the rest best, but no machine has."""
-    many: Search | None = None
-    """All kinds fitted together, where that predicts about as well as the few do."""
-
-    @property
-    def library(self) -> Library:
-        """Return the library searched."""
-        return self.work.library
-
-    @property
-    def lacking(self) -> tuple[Effect, ...]:
-        """Return what was taken out of the library and fits clearly better than what was found."""
-        robot = self.final.model.robot
-        return tuple(effect for effect in self.refused if not beyond(robot, effect))
-
-    def apart_from_strays(self) -> Search:
-        """Return the same with no weight for readings that stray by themselves; itself without any."""
-        scale = without_strays(self.scale)
-        if scale is self.scale:
-            return self
-        left = self.problem.whitened(self.problem.residuals(self.final.model), scale)
-        return replace(self, scale=scale, final=replace(self.final, residual=left))
-
-    def effective(self, result: Fit) -> float:
-        """Return the number of independent rows of a fit on the workspace's measurements."""
-        return self.work.effective(result)
 
 
 def search(

@@ -21,12 +21,10 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Row, Search, Verdict, marginal
 from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.decision import Verdict
-from ..verdict.evidence import Row, marginal
 from .curved import Curved
 from .free_form import FreeForm, Part
 

@@ -13,14 +13,12 @@ from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.fit import fit, robust_fit, robust_scale
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Evidence, Left, Scatter, Search, Verdict
 from ..result import NAMING, Shrink, Site, Structure
 from ..unseen.folds import gain
 from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.decision import Left, Verdict
-from ..verdict.evidence import Evidence, Scatter
 from .free_form import FreeForm, Part, free_form
 
 ROWS = 6000

@@ -17,11 +17,11 @@ from ..algebra.definite import factored
 from ..algebra.fit import Fit
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
+from ..evidence import marginal
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import steadiness, ways_to_divide
 from ..unseen.groups import Group, all_groups
 from ..unseen.unseen_stretches import Base, Unseen
-from ..verdict.evidence import marginal
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""

@@ -15,12 +15,11 @@ from ...effects.plausible import beyond
 from ...recording import Recording
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Evidence, Search
 from ..result import Family, Shrink, Site, Structure
 from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.evidence import Evidence
 from .scatter import scattered
 
 

@@ -28,10 +28,9 @@ from ...effects.curves import QUANTITIES
 from ...twin.features import Features
 from ..algebra.independent_rows import measured_axes
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Scatter, Search
 from ..unseen.folds import STRETCHES, jackknife
 from ..unseen.unseen_stretches import Unseen
-from ..verdict.evidence import Scatter
 
 LEAST = 80
 """Measurements of a recording from which on variances are estimated: ten for each fold."""

@@ -21,7 +21,7 @@ from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Search
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen

@@ -38,9 +38,8 @@ from ..algebra.fit import (
 )
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import hardly_moves, moved_most, separable_orders
+from ..algebra.still_joints import candidate_kinds, hardly_moves, moved_most, separable_orders
 from ..beliefs import Beliefs
-from ..hypotheses.library import candidate_kinds
 from ..unseen.unseen_stretches import Unseen
 
 SEEN = 0.05
@@ -87,7 +86,7 @@ def _everything(
     most = problem.size // (4 * model.robot.n)
     out: list[Effect] = []
     small: Sequence[Effect]
-    for kind in candidate_kinds((), problem.align):
+    for kind in candidate_kinds(problem.align):
         alike = kind.traits.common and kind.stage not in (Stage.SERVO, Stage.CLOCK)
         if kind.name in exclude or not alike:
             # Postures visited in an order look like a creep, which goes on where the arm does not.

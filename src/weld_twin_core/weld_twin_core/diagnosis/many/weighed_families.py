@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
+from ..algebra.any_motion import same_error
 from ..beliefs import Beliefs
-from ..hypotheses.any_motion import same_error
-from ..hypotheses.search import Search
+from ..evidence import Search
 from ..result import Family, Site
 from ..unseen.folds import TINY, growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen

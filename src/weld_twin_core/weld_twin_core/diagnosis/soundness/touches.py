@@ -23,9 +23,10 @@ from ...contacts import Artefact, Contact, Contacts
 from ...recording import Recording
 from ..algebra.fit import robust_fit, robust_scale
 from ..algebra.independent_rows import robust_spread
+from ..algebra.places import FEWEST
 from ..algebra.problem import Model, Problem
 from ..algebra.still_joints import plain_causes
-from ..frames.aligned import FEWEST, aligned
+from ..frames.aligned import aligned
 from ..result import Unsound
 from .evidence import Finding, mistake
 from .limits import CLEAR, FEW, LARGE, ROWS, RUN, STRAY, TINY, UNDONE, WORTH

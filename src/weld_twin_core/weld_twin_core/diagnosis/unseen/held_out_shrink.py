@@ -1,18 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-How far the gap shrinks on data that were not used for fitting, and what these choose.
-
-A joint that hardly moves shows its zero and its gear ratio alike, and the search takes one of the
-two. Where a held-out motion moves it, they part. Nothing is fitted to the held-out recordings; they
-choose among two or three, and only where these part plainly.
-"""
+"""How far the gap shrinks on data that were not used for fitting."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -21,14 +14,11 @@ from ...arrays import Array
 from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
+from ..algebra.places import by_place, posed
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
-from ..frames.aligned import aligned
-from ..hypotheses.alternatives import Alternative, CandidateSet, fit_alternatives, with_leads
-from ..hypotheses.search import Search, refitted
-from ..hypotheses.seed_systems import Role
-from ..hypotheses.selection import implausible
-from ..result import Shrink, Site
+from ..evidence import Search
+from ..result import Shrink
 from .folds import jackknife, posture_regions
 from .unseen_stretches import Unseen
 
@@ -181,7 +171,10 @@ def _on_bags(
 def _on_contacts(result: Search, recording: Recording) -> list[tuple[Array, Array]]:
     """Return squared errors before and after at every place of held-out contacts."""
     model = result.final.model
-    problem, start = aligned((recording,), model.robot, frozenset(), model.known)
+    parts = by_place(recording)
+    nominal = (model.robot.T_world_base,) * len(parts)
+    start = Model(model.robot, nominal, model.known, given=(0,) * len(parts))
+    problem = posed((), parts, start, frozenset())
     own = [k for k, r in enumerate(result.problem.recordings) if r.contacts is not None]
     sizes = []
     for fitted in (result.baseline.model, model):
@@ -252,77 +245,3 @@ def ratio_interval(
         variance += min(abs(float(apart)), farthest) ** 2
     reach = STUDENT * np.sqrt(variance)
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))
-
-
-def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
-    """
-    Return the search with the effects and the alternatives that held-out recordings bear out.
-
-    An effect gives its place to its like where that alone carries over. Then those that leave more
-    than the effect in the model are no alternatives.
-
-    holdout: never fitted; without any nothing changes.
-    """
-    if not holdout:
-        return result
-    # What no machine has is left out of the model and its candidate sets, not of their fits.
-    if len(result.candidate_sets) == len(result.small.model.found):
-        result = _exchanged(result, holdout, beliefs)
-    candidate_sets = list[CandidateSet]()
-    for effect, candidate_set in zip(
-        result.final.model.found, result.candidate_sets, strict=False
-    ):
-        own = Site.of(effect)
-        close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
-        certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure
-        if not certain and len(close) > 1:
-            remaining = _left(result, close, holdout, beliefs)
-            by_site = dict(zip((r.site for r in close), remaining, strict=True))
-            candidate_set = _alike(candidate_set, own, by_site, beliefs)
-        candidate_sets.append(candidate_set)
-    return replace(result, candidate_sets=tuple(candidate_sets))
-
-
-def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
-    """Return the search with every effect replaced by its like where that alone carries over."""
-    for _ in result.candidate_sets:
-        # Those that could be in the model as well.
-        likes = [
-            one
-            for one in chain.from_iterable(result.candidate_sets)
-            if one.probability >= beliefs.listed
-            and one.fit is not result.small
-            and one.role is not Role.TAKEN_OUT
-        ]
-        remaining = _left(result, likes, holdout, beliefs)
-        least = min(remaining, default=float('inf'))
-        if not likes or (1.0 + beliefs.parted) * least > left_on(result, holdout, beliefs):
-            break
-        better = likes[remaining.index(least)]
-        tried = refitted(result, better.fit)
-        if implausible(tried.final.model):
-            break
-        case = result.work, better.fit
-        every = [fit_alternatives(*case, k) for k in range(len(better.fit.model.found))]
-        candidate_sets, refused = with_leads(*case, every)
-        result = replace(tried, candidate_sets=candidate_sets, refused=(*tried.refused, *refused))
-    return result
-
-
-def _left(
-    result: Search, some: Sequence[Alternative], holdout: Sequence[Recording], beliefs: Beliefs
-) -> list[float]:
-    """Return what each alternative leaves on held-out recordings, RMS [m]."""
-    return [left_on(replace(result, final=one.fit), holdout, beliefs) for one in some]
-
-
-def _alike(
-    candidate_set: CandidateSet, own: Site, remaining: dict[Site, float], beliefs: Beliefs
-) -> CandidateSet:
-    """Return a candidate set without the alternatives that leave more than the effect in the model."""
-    most = (1.0 + beliefs.parted) * min(remaining.values())
-    if remaining.get(own, most) > most:
-        return candidate_set
-    kept = [one for one in candidate_set if remaining.get(one.site, most) <= most]
-    whole = sum(one.probability for one in kept)
-    return tuple(replace(one, probability=one.probability / whole) for one in kept)

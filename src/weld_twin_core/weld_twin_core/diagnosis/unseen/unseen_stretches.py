@@ -31,7 +31,7 @@ from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
 from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
-from ..hypotheses.starts import chosen_anew
+from ..algebra.starts import chosen_anew
 from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
 DAMPING = 1e-11

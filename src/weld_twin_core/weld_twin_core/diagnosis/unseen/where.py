@@ -17,7 +17,7 @@ import numpy as np
 from ..algebra.fit import Fit, trusted
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
-from ..hypotheses.search import Search
+from ..evidence import Search
 from ..result import Cause, Structure, Where
 from .chance import Candidates, chance_gain, may_be_chance
 from .folds import Gain

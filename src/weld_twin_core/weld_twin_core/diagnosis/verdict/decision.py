@@ -12,19 +12,14 @@ is the mean of the same jumps, and no cause beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from ..beliefs import Beliefs
-from ..hypotheses.alternatives import CandidateSet
-from ..result import Family, Site, Structure
-from .evidence import Evidence, named_together
+from ..evidence import CandidateSet, Evidence, Left, Verdict, named_together
+from ..result import Family, Site
 
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
-TINY = 1e-18
-"""Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
 LISTED = 8
 """Readings that a sentence lists one by one at the most."""
 NO_GAP = 'there is no gap above the noise'
@@ -41,99 +36,6 @@ _NO_KIND = (
     'no kind of error is needed by these data more than the others: each takes the place of the '
     'rest'
 )
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """
-    Status, one set of sites per reported effect, families of many small ones, and how sure it is.
-
-    An effect that counts as named is reported whatever the status: 'unknown' says that beside it
-    something is at work that has no name. ``confidence`` is the probability that the whole answer
-    is right, ``sure`` says whether it keeps the promise of being wrong hardly ever, and
-    ``complete`` is the probability that no cause of any size is missing; all three are told by the
-    calibration.
-    """
-
-    status: str
-    sets: tuple[tuple[Site, ...], ...] = ()
-    reasons: tuple[str, ...] = ()
-    families: tuple[Family, ...] = ()
-    confidence: float = 0.0
-    sure: bool = False
-    complete: float = 0.0
-
-
-def beyond_doubt(structure: Structure, beliefs: Beliefs) -> bool:
-    """Return whether what generic columns find is there beyond doubt."""
-    gain, sure = structure.gain, structure.sure
-    usual = gain > beliefs.structure_gain and sure > beliefs.structure_sure
-    blatant = gain > beliefs.blatant_gain and sure > beliefs.blatant_sure
-    return (usual or blatant) and gain > structure.chance
-
-
-@dataclass(frozen=True, eq=False)
-class Left:
-    """Evidence, and the numbers from which on what it leaves is more than noise."""
-
-    evidence: Evidence
-    beliefs: Beliefs
-
-    @property
-    def structured(self) -> bool:
-        """Return whether generic columns find something beyond doubt."""
-        return beyond_doubt(self.evidence.structure, self.beliefs)
-
-    @property
-    def high(self) -> bool:
-        """Return whether what remains rises above a floor that was measured apart."""
-        evidence = self.evidence
-        return evidence.independent and self.rises(self.beliefs.above)
-
-    @property
-    def wide(self) -> bool:
-        """Return whether what remains is far wider than a floor that only the fit shows."""
-        evidence = self.evidence
-        return not evidence.independent and self.rises(self.beliefs.far_above)
-
-    def rises(self, times: float) -> bool:
-        """Return whether what remains is so many times the floor, and more than chance makes it."""
-        evidence = self.evidence
-        return evidence.after > max(times, evidence.leverage) * evidence.floor
-
-    @property
-    def above_noise(self) -> bool:
-        """Return whether what remains is more than noise."""
-        return self.structured or self.high
-
-    @property
-    def share(self) -> float:
-        """Return the share of the squared gap above noise that is not explained."""
-        evidence = self.evidence
-        structured = evidence.structure.gain * evidence.after**2 if self.structured else 0.0
-        over = evidence.after**2 - evidence.floor**2 if self.high else 0.0
-        if self.wide:
-            # Such a floor may be too low by that factor; what is beyond is left all the same.
-            over = evidence.after**2 - (self.beliefs.far_above * evidence.floor) ** 2
-        return float(np.clip(max(structured, over) / self._excess, 0.0, 1.0))
-
-    @property
-    def scattered(self) -> float:
-        """Return what noise that comes from joints is of the squared gap above noise."""
-        part = sum(one.share for one in self.evidence.scattered)
-        return float(np.clip(part * self.evidence.after**2 / self._excess, 0.0, 1.0))
-
-    @property
-    def explained(self) -> float:
-        """Return the share of the squared gap above noise that the model takes off unseen data."""
-        evidence = self.evidence
-        return float(np.clip((evidence.gap**2 - evidence.after**2) / self._excess, 0.0, 1.0))
-
-    @property
-    def _excess(self) -> float:
-        evidence = self.evidence
-        least = self.beliefs.least_excess * evidence.floor**2
-        return max(evidence.gap**2 - evidence.floor**2, least, TINY)
 
 
 def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import EMPTY, FLAT, Index, unit_diagonal
-from ..result import Site
+from .definite import EMPTY, FLAT, Index, unit_diagonal
+from .problem import Site
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above

@@ -13,11 +13,11 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.memory import Picker
-from ..algebra.columns import Maker, Piece, Rows, rows_of
-from ..algebra.definite import outside, span_of
-from ..algebra.fit import design
-from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import moved_most
+from .columns import Maker, Piece, Rows, rows_of
+from .definite import outside, span_of
+from .fit import design
+from .problem import Model, Problem, Scale
+from .still_joints import moved_most
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
 LEAST = 1e-9

@@ -21,8 +21,8 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
-from ..algebra.definite import outside, share_outside, span_of
-from ..result import Site
+from .definite import outside, share_outside, span_of
+from .problem import Site
 
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""

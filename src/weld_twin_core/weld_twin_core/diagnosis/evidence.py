@@ -21,15 +21,17 @@ from ..arrays import Array
 from ..effects.effect import Effect
 from ..effects.plausible import beyond
 from ..effects.registry import REGISTRY
+from .algebra.definite import ROUNDING
 from .algebra.fit import Fit, without_strays
+from .algebra.noise_floor import NANOMETRE
 from .algebra.problem import Problem, Scale, Site
 from .algebra.seed_systems import Role
 from .algebra.workspace import Library, Workspace
 from .beliefs import Beliefs
 from .result import Family, Structure
 
-TINY = 1e-18
-"""Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
+LIKELIER = 0.5
+"""Probability from which on a cause counts as named: it is likelier right than wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +190,11 @@ class Evidence:
     scattered: tuple[Scatter, ...] = ()
     """Noise that comes from joints beyond doubt, largest first."""
 
+    @property
+    def noise(self) -> float:
+        """Return the floor, or what little it is divided by where there is none [m]."""
+        return max(self.floor, ROUNDING)
+
 
 Key = TypeVar('Key')
 
@@ -339,4 +346,4 @@ class Left:
     def _excess(self) -> float:
         evidence = self.evidence
         least = self.beliefs.least_excess * evidence.floor**2
-        return max(evidence.gap**2 - evidence.floor**2, least, TINY)
+        return max(evidence.gap**2 - evidence.floor**2, least, NANOMETRE**2)

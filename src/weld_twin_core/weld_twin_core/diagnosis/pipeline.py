@@ -20,7 +20,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
-from .evidence import Row, Search, beyond_doubt
+from .evidence import LIKELIER, Row, Search, beyond_doubt
 from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
 from .hypotheses.borne_out import borne_out
@@ -40,7 +40,7 @@ from .soundness.richness import refuse_reused
 from .unseen.held_out_shrink import held_out_shrink, left_on
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
-from .verdict.decision import LIKELIER, decide
+from .verdict.decision import decide
 
 Progress = Callable[[str], None]
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 
+from weld_twin_core.diagnosis.evidence import LIKELIER
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
-from weld_twin_core.diagnosis.verdict.decision import LIKELIER
 from weld_twin_core.effects import REGISTRY
 
 _PARAMETERS = {

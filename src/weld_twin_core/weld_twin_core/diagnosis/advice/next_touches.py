@@ -30,6 +30,7 @@ from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
 from ...sequences import halton
 from ...twin.features import Features
+from ..algebra.definite import FLAT
 from ..algebra.fit import effect_precision, frame_prior
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..algebra.still_joints import plain_causes
@@ -267,7 +268,7 @@ def _reached(
     q, good = reaching(robot, to, start)
     good &= ((q >= low) & (q <= high)).all(axis=1)
     leaned = np.concatenate([forward(robot, r.joints.q)[:, :3, 2] for r in recordings])
-    middle = leaned.mean(axis=0) / max(float(np.linalg.norm(leaned.mean(axis=0))), 1e-9)
+    middle = leaned.mean(axis=0) / max(float(np.linalg.norm(leaned.mean(axis=0))), FLAT)
     good &= forward(robot, q)[:, :3, 2] @ middle >= (leaned @ middle).min()
     return q, good
 
@@ -284,8 +285,6 @@ MOST = 40
 """Touches up to which the number needed is reported."""
 _REACHABLE = 0.9
 """Share of what all touches together could narrow that counts as enough."""
-_LEAST = 1e-9
-"""Size of an effect that counts as none; keeps a share from a division by zero."""
 _MOVING = 10.0
 """Cost [min] of fastening the artefact elsewhere."""
 
@@ -325,7 +324,7 @@ def next_touches(
     new = [option for option in options if option.place is not None]
     few = new if new and len(problem.recordings) < PLACES else options
     best = min(few, key=lambda option: option.best.open(weight))
-    parted = None if disputed is None else best.best.open(weight) ** -0.5
+    parted = None if disputed is None else 1.0 / float(np.sqrt(best.best.open(weight)))
     return _entry(best, spread, model, parted)
 
 
@@ -396,7 +395,7 @@ def _sizes(design: Design, effects: Sequence[Effect], disputed: set[tuple[str, .
     for effect in effects:
         x = effect.fit.coordinates()
         if effect.key in disputed:
-            out[at : at + x.size] = 1.0 / np.maximum(x @ x, _LEAST**2)
+            out[at : at + x.size] = 1.0 / np.maximum(x @ x, FLAT**2)
         at += x.size
     return np.diag(out)
 
@@ -407,7 +406,7 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
     q = np.concatenate([each.recording.joints.q for each in touches])[rows]
     labels = [label for each in touches for label in each.recording.touched.labels]
     both = (best.known[0], best.best)
-    before, after = (1e3 * each.sigma * each.open(spread) ** 0.5 for each in both)
+    before, after = (1e3 * each.sigma * float(np.sqrt(each.open(spread))) for each in both)
     what = f'Touch what was touched in these {len(rows)} postures.'
     if place is not None:
         x, y, z = place

@@ -164,12 +164,12 @@ class Room:
             way = np.abs(end - start)
             # A cosine is pi/2 times faster than its mean, and hardest at its ends.
             span = max(
-                float((0.5 * np.pi * way / fast).max()),
-                float(np.pi * np.sqrt(0.5 * way / hard).max()),
+                float((np.pi / 2.0 * way / fast).max()),
+                float(np.pi * np.sqrt(way / 2.0 / hard).max()),
                 4.0 / _RATE,
             )
             count = int(np.ceil(span * _RATE))
-            s = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, count + 1) / count))
+            s = (1.0 - np.cos(np.pi * np.arange(1, count + 1) / count)) / 2.0
             pieces.append(start + s[:, None] * (end - start))
         q = np.concatenate(pieces)
         return JointMotion(np.arange(len(q)) / _RATE, q)
@@ -197,8 +197,8 @@ def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
     The recorded range, a little wider, within the limits.
     """
     q = np.concatenate([r.joints.q for r in problem.recordings])
-    middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
-    half = np.maximum(_REACH * 0.5 * np.ptp(q, axis=0), _LEAST)
+    middle = (q.min(axis=0) + q.max(axis=0)) / 2.0
+    half = np.maximum(_REACH / 2.0 * np.ptp(q, axis=0), _LEAST)
     inset = np.where(np.isfinite(robot.upper - robot.lower), _INSET, 0.0)
     low = np.maximum(middle - half, robot.lower + inset)
     high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)

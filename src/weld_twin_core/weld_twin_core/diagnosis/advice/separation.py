@@ -27,6 +27,7 @@ from ...arrays import Array, spread_over
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ...twin.features import with_expected_effort
+from ..algebra.definite import REPEATED
 from ..algebra.fit import design, effect_precision, with_weights
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, Piece
@@ -37,8 +38,6 @@ _SAMPLES = 120
 """Samples of a path that are computed; neighbours of a moving arm say the same."""
 _EVERY = 0.15
 """Time [s] after which a moving arm says something new: in it the arm moves by centimetres."""
-_LOOSE = 1e-10
-"""Added to the diagonal of a normal matrix, as a share of it: what is less is rounding."""
 
 _Alternative = tuple[Effect, ...]
 
@@ -89,7 +88,7 @@ def _remainder(matrices: Array) -> Array:
     scaled = matrices / size[:, :, None]
     scaled /= size[:, None, :]
     each = np.arange(matrices.shape[1] - 1)
-    scaled[:, each, each] += _LOOSE
+    scaled[:, each, each] += REPEATED
     try:
         # The last pivot of the factor is what is left, at half the work of solving.
         return np.asarray(size[:, -1] * np.linalg.cholesky(scaled)[:, -1, -1])

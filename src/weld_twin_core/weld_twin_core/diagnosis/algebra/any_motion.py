@@ -21,7 +21,7 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
-from .definite import outside, share_outside, span_of
+from .definite import EMPTY, outside, share_outside, span_of
 from .problem import Site
 
 POSTURES = 40
@@ -114,7 +114,7 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
     rows = np.concatenate([np.zeros((0, span.shape[1])), *(columns(robot, e) for e in singles)])
     shown = share_outside(rows, span) > SAME
     rows = outside(rows, span)
-    unit = rows / np.maximum(np.linalg.norm(rows, axis=1), 1e-300)[:, None]
+    unit = rows / np.maximum(np.linalg.norm(rows, axis=1), EMPTY)[:, None]
     same = np.outer(shown, shown) & (np.abs(unit @ unit.T) > 1.0 - SAME**2)
     can_be_set = np.array([e.traits.set_at_controller for e in singles], dtype=bool)
     found = same[:, can_be_set].any(axis=1) & ~can_be_set

@@ -21,7 +21,7 @@ from ...arm.channels import Shift
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.features import Features
-from .definite import Index, inverted, unit_diagonal, well_conditioned
+from .definite import EMPTY, ROUNDING, Index, inverted, unit_diagonal, well_conditioned
 from .problem import Model, Problem, Scale
 
 Rows = slice | Index
@@ -31,10 +31,6 @@ MANY = 32
 as quick written out."""
 BLOCKS = 24
 """Folds whose scores are kept apart: enough to estimate a variance to a third."""
-SINGULAR = 1e-12
-"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
-TINY = 1e-300
-"""Keeps a division by the variance of a coordinate that nothing moves finite."""
 
 
 def rows_of(labels: Array) -> list[Rows]:
@@ -320,7 +316,7 @@ def columns_covariance(
     blocks = max(len(each), 2)
     together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
     own = np.diag(inverse)
-    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, TINY)) / size
+    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, EMPTY)) / size
     return np.asarray(inverse * np.outer(wider, wider))
 
 
@@ -335,6 +331,6 @@ def unit_inverse(columns: Columns, ridge: Array) -> tuple[Array, Array]:
     scaled, size = unit_diagonal(normal)
     if not size.size:
         return scaled, size  # LAPACK complains of a matrix of no columns.
-    if well_conditioned(scaled, SINGULAR):
+    if well_conditioned(scaled, ROUNDING):
         return inverted(scaled), size
-    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size
+    return np.asarray(np.linalg.pinv(scaled, rcond=ROUNDING, hermitian=True)), size

@@ -23,10 +23,16 @@ SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""
 Index = NDArray[np.intp]
 
-FLAT = 1e-9
-"""A column whose norm falls below this share once others are projected out carries nothing new."""
 EMPTY = 1e-300
-"""Least squared norm of a column; keeps a column of zeros from a division by zero."""
+"""Least that anything is divided by: keeps a division by what is nothing, as the norm of a column of
+zeros, finite."""
+ROUNDING = 1e-12
+"""Share of a number below which another beside it is its rounding."""
+REPEATED = 1e-11
+"""Added to a diagonal of ones, so that columns that repeat others do no harm; far above rounding, far
+below what a column must add to differ from the others."""
+FLAT = 1e-9
+"""A direction, or a column once others are projected out, of less than this share carries nothing."""
 
 
 def inverted(matrix: Array) -> Array:
@@ -47,7 +53,7 @@ def inverse_of(root: Array) -> Array:
     lower = dpotri(root, lower=1, overwrite_c=1)[0]
     out: Array = lower + lower.T  # above its diagonal the root is empty
     diagonal = np.einsum('ii->i', out)
-    diagonal *= 0.5
+    diagonal /= 2.0
     return out
 
 
@@ -129,10 +135,6 @@ def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
     return scaled, size
 
 
-SINGULAR = 1e-9
-"""Strength of a direction, as a share of the strongest, below which it is rounding."""
-
-
 def span_of(columns: Array) -> Array:
     """
     Return orthonormal rows that span columns, (P, rows), of any size, which may repeat each other.
@@ -144,7 +146,7 @@ def span_of(columns: Array) -> Array:
     if not shown.size:
         return np.zeros((0, columns.shape[1]))
     _, strength, span = np.linalg.svd(shown, full_matrices=False)
-    return np.asarray(span[strength > SINGULAR * strength[0]])
+    return np.asarray(span[strength > FLAT * strength[0]])
 
 
 def outside(columns: Array, span: Array) -> Array:
@@ -155,4 +157,4 @@ def outside(columns: Array, span: Array) -> Array:
 def share_outside(columns: Array, span: Array) -> Array:
     """Return the share of each column, shape (K,), that a span does not hold; 0 of one that is zero."""
     remaining = np.linalg.norm(outside(columns, span), axis=1)
-    return np.asarray(remaining / np.maximum(np.linalg.norm(columns, axis=1), 1e-300))
+    return np.asarray(remaining / np.maximum(np.linalg.norm(columns, axis=1), EMPTY))

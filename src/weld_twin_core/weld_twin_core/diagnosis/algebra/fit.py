@@ -23,8 +23,9 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.plausible import spreads
 from .columns import Columns, designed
-from .definite import factored, unit_diagonal
+from .definite import EMPTY, FLAT, REPEATED, ROUNDING, factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
+from .noise_floor import NANOMETRE
 from .problem import Model, Problem, Scale
 
 FRAME_SHIFT = 0.02
@@ -37,7 +38,7 @@ STRAIGHT = 1e-6
 where the residual is as good as linear, another step finds nothing."""
 STEADY = 1e-4
 """The same share up to which columns serve for the next step, too: they have hardly turned."""
-DAMPING, DAMPED = 1e-9, 1e6
+DAMPING, DAMPED = FLAT, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
 HUBER = 3.0
 """A sample this many robust deviations off starts to lose weight."""
@@ -201,7 +202,7 @@ def _descended(
             there, damping = None, max(damping * 100.0, 1e-6)
         if there is None:
             break
-        gain = (here.cost - there.cost) / max(here.cost, 1e-300)
+        gain = (here.cost - there.cost) / max(here.cost, EMPTY)
         missed = abs(there.cost - expected)
         here, damping = there, max(damping * 0.01, DAMPING)
         if gain < tolerance or missed < STRAIGHT * there.cost:
@@ -281,16 +282,16 @@ def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
     damping: added to the unit diagonal of the scaled equations.
     """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
-    live = size > 1e-12 * max(size.max(initial=0.0), 1e-300)
+    live = size > ROUNDING * max(size.max(initial=0.0), EMPTY)
     out = np.zeros(right.size)
     if not live.any():
         return out
-    scaled, _ = unit_diagonal(normal[np.ix_(live, live)], max(damping, 1e-11))
+    scaled, _ = unit_diagonal(normal[np.ix_(live, live)], max(damping, REPEATED))
     wanted = right[live] / size[live]
     try:
         out[live] = factored(scaled.copy())(wanted) / size[live]
     except LinAlgError:
-        out[live] = np.linalg.lstsq(scaled, wanted, rcond=1e-12)[0] / size[live]
+        out[live] = np.linalg.lstsq(scaled, wanted, rcond=ROUNDING)[0] / size[live]
     return out
 
 
@@ -324,14 +325,14 @@ def robust_scale(
         sigma_turn /= np.sqrt(max(kept, KEPT))
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
-    sigma = max(sigma, 1e-9)
+    sigma = max(sigma, NANOMETRE)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
     for part, own in zip(residuals, given, strict=True):
-        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
+        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3) / sigma
         if part.shape[0] > 3:
-            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
-        weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
+            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3) / sigma_turn)
+        weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, ROUNDING)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
 
 

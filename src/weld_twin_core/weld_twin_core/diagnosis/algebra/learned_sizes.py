@@ -20,13 +20,13 @@ from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...errors import DataError
-from .definite import solved
+from .definite import FLAT, ROUNDING, solved
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
 LEAST_VARIANCE = 1e-8
 """Least variance of a group, in typical sizes: a ten thousandth of the usual error is none."""
-JITTER = (1e-12, 1e-9, 1e-6, 1e-3, 1.0)
+JITTER = (ROUNDING, FLAT, 1e-6, 1e-3, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
 
 
@@ -124,7 +124,7 @@ def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Arr
         return normal, right, rss
     cross = normal[:frames, frames:]
     wanted = np.column_stack([cross, right[:frames]])
-    solved = np.linalg.lstsq(normal[:frames, :frames], wanted, rcond=1e-12)[0]
+    solved = np.linalg.lstsq(normal[:frames, :frames], wanted, rcond=ROUNDING)[0]
     left = normal[frames:, frames:] - cross.T @ solved[:, :-1]
     pull = right[frames:] - cross.T @ solved[:, -1]
     return left, pull, rss - float(right[:frames] @ solved[:, -1])

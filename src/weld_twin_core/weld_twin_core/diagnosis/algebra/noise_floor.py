@@ -12,6 +12,10 @@ from ...arrays import Array
 from .independent_rows import measured_axes, robust_spread
 from .problem import Problem
 
+NANOMETRE = 1e-9
+"""Least error [m] divided by, far below any instrument."""
+THIRD = 20.0
+"""Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
 SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""
 ENOUGH = 12
@@ -36,7 +40,7 @@ class NoiseFloor(NamedTuple):
     @property
     def rms_m(self) -> float:
         """Return the RMS distance that it makes in three coordinates, [m]."""
-        return self.sigma * float(np.sqrt(3.0))
+        return self.sigma * float(np.sqrt(3))
 
 
 def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) -> NoiseFloor:
@@ -60,7 +64,7 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
             direct = None if reported is None else float(np.median(reported))
             independent = False
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
-        share = float(np.sqrt(position.shape[0] / 3.0))
+        share = float(np.sqrt(position.shape[0] / 3))
         sigma = min(remaining, WIDEST) if direct is None else min(direct, remaining)
         estimates.append((share * sigma, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
@@ -77,7 +81,7 @@ def _differences(position: Array) -> float | None:
     if position.shape[1] < ENOUGH:
         return None
     third = np.diff(position, n=3, axis=1)
-    return robust_spread(third) / float(np.sqrt(20.0))
+    return robust_spread(third) / float(np.sqrt(THIRD))
 
 
 def _repeats(q: Array, position: Array) -> float | None:

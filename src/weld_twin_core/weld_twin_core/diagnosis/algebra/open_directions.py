@@ -16,6 +16,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from .definite import FLAT
 from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
 from .independent_rows import effective_share
 from .problem import Model, Problem, Scale
@@ -94,7 +95,7 @@ def keep_open_directions(
     if not free.vectors.size:
         return result
     off, weight = _off(problem, result.model, given)
-    back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
+    back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=FLAT)[0]
     changed = sum(change.effect.fit.coordinates().size for change in result.model.changes)
     count = problem.shared_count + changed + result.coordinates.size
     step = np.concatenate([free.vectors @ back, np.zeros(count)])

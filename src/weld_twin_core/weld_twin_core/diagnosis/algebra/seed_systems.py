@@ -20,14 +20,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from .definite import EMPTY, FLAT, Index, unit_diagonal
+from .definite import EMPTY, FLAT, REPEATED, ROUNDING, Index, unit_diagonal
 from .problem import Site
 
-SINGULAR = 1e-11
-"""Added to the diagonal of ones, so that columns that repeat others do no harm; far above
-rounding, far below what a column must add to differ from the others."""
-PERFECT = 1e-12
-"""Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
 FEWEST = 3.0
 """Independent rows at the least: a position has three coordinates."""
 
@@ -119,7 +114,7 @@ class SeedSystems:
         products: of all columns with the model's, and with the residual, shape (all columns, P + 1).
         """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
-        scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
+        scaled, size = unit_diagonal(normal[np.ix_(live, live)], ROUNDING)
         cross = products[:, live] / size
         wanted = np.column_stack([cross.T, pull[live] / size])
         solved = np.linalg.solve(scaled, wanted) if live.size else wanted
@@ -150,7 +145,7 @@ def grown(
     # Ones on the diagonal; what is not live stands by itself.
     unit, both = np.sqrt(np.where(live, diagonal, 1.0)), live[:, :, None] & live[:, None]
     remaining = np.where(both, alike.normal / (unit[:, :, None] * unit[:, None]), eye)
-    remaining, pull = remaining + SINGULAR * eye, np.where(live, alike.right / unit, 0.0)
+    remaining, pull = remaining + REPEATED * eye, np.where(live, alike.right / unit, 0.0)
     count, together = live.sum(axis=1, dtype=np.float64), np.full(len(live), -np.inf)
     hopeful = np.ones(len(live), bool)
     if (several := count > 1).any():
@@ -187,7 +182,7 @@ def _projected(remaining: Array, pull: Array, k: Index) -> tuple[Array, Array]:
     pull = pull - share * pull[each, k][:, None]
     remaining = remaining - share[:, :, None] * row[:, None]
     diagonal = np.einsum('sii->si', remaining)
-    diagonal[:] = np.maximum(diagonal, SINGULAR)
+    diagonal[:] = np.maximum(diagonal, REPEATED)
     return remaining, pull
 
 
@@ -212,9 +207,9 @@ def evidence(rss: float, gain: float, freedom: float, effective: float) -> float
 def evidences(rss: float, gain: Array, freedom: Array | float, effective: float) -> Array:
     """Return the `evidence` of many falls at once, ``gain`` and ``freedom`` of shape (S,)."""
     # Where nothing was left before, nothing can fall.
-    remaining = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
+    remaining = np.maximum(rss - gain, ROUNDING * rss) / rss if rss > 0.0 else np.ones_like(gain)
     count = max(effective, FEWEST)
-    return np.asarray(-0.5 * count * np.log(remaining) - 0.5 * freedom * np.log(count))
+    return np.asarray(-(count * np.log(remaining) + freedom * np.log(count)) / 2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +240,7 @@ class Choice:
     def effect(self) -> Effect:
         """Return the effect that the least-squares coefficients stand for."""
         normal = self.alike.normal[self.row][np.ix_(self.chosen, self.chosen)]
-        scaled, size = unit_diagonal(normal, SINGULAR)
+        scaled, size = unit_diagonal(normal, REPEATED)
         right = self.alike.right[self.row][self.chosen]
         coefficients = np.zeros(self.alike.columns.shape[1])
         coefficients[self.chosen] = np.linalg.solve(scaled, right / size) / size

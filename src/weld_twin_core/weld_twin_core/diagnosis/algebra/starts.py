@@ -14,14 +14,12 @@ from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.memory import Picker
 from .columns import Maker, Piece, Rows, rows_of
-from .definite import outside, span_of
+from .definite import EMPTY, FLAT, ROUNDING, outside, span_of
 from .fit import design
 from .problem import Model, Problem, Scale
 from .still_joints import moved_most
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
-LEAST = 1e-9
-"""Size, as a share of the typical one, that is taken for less: zero has no logarithm."""
 USUAL = 0.8
 """Spread of the logarithm of a frequency or a damping about the typical one."""
 CHANCE = 0.01
@@ -105,7 +103,7 @@ def _prior(effects: list[Effect]) -> Array:
     typical = np.array([effects[0].parameters[k].typical for k in bent])
     values = np.array([effect.vector()[bent] for effect in effects])
     return np.asarray(
-        -0.5 * ((np.log(np.maximum(values / typical, LEAST)) / USUAL) ** 2).sum(axis=1)
+        -((np.log(np.maximum(values / typical, FLAT)) / USUAL) ** 2).sum(axis=1) / 2.0
     )
 
 
@@ -196,7 +194,7 @@ class _Looker:
         pull = piece.products(self.residual[None])[:, 0]
         mass = piece.each**2 @ piece.joint.summed(piece.joint.row * self.seen)
         shared = (piece.products(self.span) ** 2).sum(axis=1)
-        return _sized(effects, pull, np.maximum(mass - shared, 1e-12 * mass + 1e-300))
+        return _sized(effects, pull, np.maximum(mass - shared, ROUNDING * mass + EMPTY))
 
 
 def _view(maker: Features, effect: Effect) -> View:

@@ -14,6 +14,7 @@ import numpy as np
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
 from .columns import Columns, designed
+from .definite import EMPTY
 from .fit import Fit, design, fit, predict_fit
 from .independent_rows import effective_share
 from .problem import Model, Problem, Scale, Site
@@ -82,7 +83,7 @@ class Workspace:
         count = share * max(result.residual.size - problem.frame_count, 1)
         # What entered first explains most, and so does what its formula misses.
         misfit = beliefs.misfit * (found[0].fit.ideal if found else 1.0)
-        explained = max(self.bare_rss - result.rss, 0.0) / max(result.rss, 1e-300) * count
+        explained = max(self.bare_rss - result.rss, 0.0) / max(result.rss, EMPTY) * count
         return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
     def independent(self, fits: Sequence[Fit]) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from ...twin.posterior import Posterior
 from ..advice import Limits, actions
 from ..algebra.any_motion import never_parted
+from ..algebra.definite import EMPTY
 from ..algebra.fit import trusted
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
@@ -209,8 +210,8 @@ def _weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, 
     for candidate_set in evidence.candidate_sets:
         least = _position_rms(result, candidate_set[0])
         for alternative in candidate_set:
-            rms = evidence.after * _position_rms(result, alternative) / max(least, 1e-300)
-            shrink = 1.0 - rms / max(evidence.gap, 1e-300)
+            rms = evidence.after * _position_rms(result, alternative) / max(least, EMPTY)
+            shrink = 1.0 - rms / max(evidence.gap, EMPTY)
             out.append(Candidate(alternative.site, alternative.probability, rms, shrink))
     return tuple(out)
 

@@ -26,6 +26,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed
+from ..algebra.definite import EMPTY
 from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
@@ -169,7 +170,7 @@ def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: floa
     if trials is None or not effect.fit.coordinates().size:
         return np.zeros(effect.fit.coordinates().size)
     others, worse = trials
-    weight = np.exp(-0.5 * share * np.maximum(worse, 0.0))
+    weight = np.exp(-share / 2.0 * np.maximum(worse, 0.0))
     apart = np.array([other.fit.coordinates() for other in others]) - effect.fit.coordinates()
     return np.asarray(np.sqrt(weight @ apart**2 / (1.0 + weight.sum())))
 
@@ -224,7 +225,7 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
     before = float(unseen.squares(unseen.bare).mean())
     after = float(unseen.squares(unseen.whole).mean())
     noise = min(floor**2, after)
-    moved = _coordinates(rng, result, (after - noise) / max(after, 1e-300))
+    moved = _coordinates(rng, result, (after - noise) / max(after, EMPTY))
     parted = _parted(_along(unseen, moved))
     unsure = _noise_unsure(result, unseen, noise, before, after)
     # Of what is left above the noise any part may be the causes'.
@@ -271,7 +272,7 @@ def _along(unseen: Unseen, moved: Array) -> Array:
 def _parted(along: Array) -> Array:
     """Return the part of every effect in what all explain; none where one works against them."""
     sizes = np.maximum(along, 0.0)
-    return np.asarray(sizes / np.maximum(sizes.sum(axis=-1, keepdims=True), 1e-300))
+    return np.asarray(sizes / np.maximum(sizes.sum(axis=-1, keepdims=True), EMPTY))
 
 
 def _noise_unsure(
@@ -279,7 +280,7 @@ def _noise_unsure(
 ) -> float:
     """Return how far off the noise's part of the gap may be, standard deviation [m^2]."""
     share = effective_share(result.final.residual, result.problem.rows, result.problem.samples)
-    count = 3.0 * share * unseen.trusted_labels().size
+    count = 3 * share * unseen.trusted_labels().size
     # It happens to lie along the gap or against it; and its square is known from so many rows.
     along = 2.0 * np.sqrt(noise * before / count) * after / before
     return float(np.hypot(along, noise * np.sqrt(2.0 / count)))

@@ -18,20 +18,18 @@ from ..advice.chosen_pieces import DECIDES
 from ..advice.experiment import confirming, extended, next_experiment
 from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
+from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
 from ..algebra.still_joints import narrow
-from ..evidence import Search, Verdict
+from ..evidence import LIKELIER, Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part
 from ..unseen.groups import Group
 
 _TOUCHED = 4
 """Explanations compared where contacts measured: every touch that could be made is tried with each."""
-_NAMELESS = 0.5
-"""Confidence of an unknown cause from which what is believed most has no name: it is then likelier
-than not that the library lacks it."""
 _FORESEEN = 2.0
 """Factor within which what parts two explanations is foreseen, as one standard deviation: how large the
 effect is, and how many samples are independent, shows only afterwards. A judgement; of five
@@ -97,7 +95,7 @@ def _parting(
     if not closed:
         room = Room(result.work.problem, result.small.model.robot, limits)
         shapes = _without_names(result, alternative, room.low, room.high)
-        if verdict.status == 'unknown' and verdict.confidence >= _NAMELESS:
+        if verdict.status == 'unknown' and verdict.confidence >= LIKELIER:
             listed, named = [*shapes, *listed], 1
         else:
             listed += shapes[:1]
@@ -119,7 +117,7 @@ def _as_weighed(result: Search) -> Scale:
     """Return the noise, as much larger as rows count less beside large effects (`effective`)."""
     fit, problem, scale = result.small, result.work.problem, result.work.scale
     apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
-    wider = float(np.sqrt(max(apart / max(result.effective(fit), 1e-9), 1.0)))
+    wider = float(np.sqrt(max(apart / max(result.effective(fit), FLAT), 1.0)))
     return replace(scale, position=wider * scale.position, orientation=wider * scale.orientation)
 
 
@@ -128,8 +126,8 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     sigma = wanted['expected_separation_sigma']
     if wanted['between'] is None or wanted['motion'] is None or sigma is None:
         return None
-    beyond = np.log(max(sigma, 1e-9) / DECIDES) / np.log(_FORESEEN)
-    parted = 0.5 * erfc(-beyond / sqrt(2.0))
+    beyond = np.log(max(sigma, FLAT) / DECIDES) / np.log(_FORESEEN)
+    parted = erfc(-beyond / sqrt(2.0)) / 2.0
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
     named = all(

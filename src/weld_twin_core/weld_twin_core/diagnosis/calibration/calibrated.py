@@ -67,8 +67,8 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
     learned = usual_calibration()
     situation = of_situation(evidence, beliefs)
     if evidence.families is not None:
-        return Stated(table, (), None, situation, evidence.floor)
-    sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
+        return Stated(table, (), None, situation, evidence.noise)
+    sizes = [size / evidence.noise for size in evidence.sizes]
     each = list(zip(table, sizes, evidence.wandered, evidence.missed, strict=False))
     on = evidence.structure.depends_on
     every = []
@@ -78,10 +78,10 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
         every.append(of_name(row, size, wandered, missed, beside, on, travel))
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
-        return Stated(table, (), None, situation, evidence.floor)
+        return Stated(table, (), None, situation, evidence.noise)
     whole = of_whole([one.probability for one in names], [one.features for one in names])
     nameless = _told('nameless', None, {**situation, **whole}, learned)
-    return Stated(table, names, nameless, situation, evidence.floor)
+    return Stated(table, names, nameless, situation, evidence.noise)
 
 
 def _travel(evidence: Evidence, row: Row) -> float:
@@ -243,7 +243,7 @@ def _led(listed: Sequence[tuple[Key, float]], first: float) -> tuple[tuple[Key, 
     if not listed:
         return ()
     (leader, own), *others = listed
-    room = (1.0 - first) / max(1.0 - own, 1e-9)
+    room = (1.0 - first) / (1.0 - own) if own < 1.0 else 0.0
     rest = [(key, min(p * room, first)) for key, p in others]
     return ((leader, first), *rest)
 

@@ -55,7 +55,7 @@ KINDS = {
 
 def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
     """Return the features that all statements of a diagnosis share."""
-    floor = max(evidence.floor, 1e-12)
+    floor = evidence.noise
     # An instrument of another law, about an origin of its own, is near to a scale and a moved base.
     places = {candidate_set[0].place for candidate_set in evidence.candidate_sets}
     return plain(
@@ -195,7 +195,7 @@ def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
         {
             'growth': log1(family.growth),
             'least growth': log1(min(family.growths, default=0.0)),
-            'size': log(family.rms_m / max(floor, 1e-12)),
+            'size': log(family.rms_m / floor),
             'members': len(cause.name),
             'kinds': kinds,
         }

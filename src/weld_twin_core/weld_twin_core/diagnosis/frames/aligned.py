@@ -22,6 +22,7 @@ from ...contacts import places
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...recording import Recording
+from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.places import by_place, posed
 from ..algebra.problem import Model, Problem, frames_named, usable
@@ -170,7 +171,7 @@ def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
             square += np.einsum('m,mki,mkj', weight, columns, columns)
             right += np.einsum('m,mki,mk', weight, columns, left)
             off.append((columns, left))
-        vector = np.asarray(np.linalg.lstsq(square, right, rcond=1e-9)[0], dtype=float)
+        vector = np.asarray(np.linalg.lstsq(square, right, rcond=FLAT)[0], dtype=float)
         weights = [1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), FLOOR) for c, s in off]
     return vector
 

@@ -29,6 +29,7 @@ import numpy as np
 
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
+from ..algebra.definite import ROUNDING
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
 
@@ -143,7 +144,7 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
             )
             normal += np.einsum('m,mki,mkj', weight, turn, turn)
             right += np.einsum('m,mki,mk', weight, turn, left)
-        tie = max(TIE * np.linalg.norm(moment), 1e-12)
+        tie = max(TIE * np.linalg.norm(moment), ROUNDING)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
         total = sum(float(weight.sum()) for weight in weights)
         vector = start[:3, 3] + np.linalg.solve(normal + TIE * total * np.eye(3), right)
@@ -323,7 +324,7 @@ def _gaps(
         return np.asarray(off)
     turned = base.rotation[:, :, None] @ _turned(track, turn)[:, None]
     apart = track.rotation[:, None] - turned
-    return np.asarray(off + LEVER * np.sqrt(0.5 * (apart**2).sum(axis=(-2, -1))))
+    return np.asarray(off + LEVER * np.sqrt((apart**2).sum(axis=(-2, -1)) / 2.0))
 
 
 def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Array) -> Array:

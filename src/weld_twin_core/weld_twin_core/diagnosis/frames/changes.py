@@ -25,7 +25,7 @@ from ...errors import ModelError
 from ...twin.features import joints_of
 from ..algebra.any_motion import constant, of_no_size
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
-from ..algebra.definite import unit_diagonal
+from ..algebra.definite import REPEATED, unit_diagonal
 from ..algebra.fit import (
     coordinates,
     design,
@@ -38,13 +38,11 @@ from ..algebra.fit import (
     with_weights,
 )
 from ..algebra.independent_rows import effective_share
-from ..algebra.problem import Change, Model, Problem, Scale
+from ..algebra.problem import ROWS, Change, Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..evidence import Search
 from ..result import Changed, Site
 
-ROWS = 9000
-"""Rows on which changes are chosen."""
 SURE = 3.0
 """A change is reported from this many standard errors on; of several numbers, the root of their mean
 chi-square. One in four hundred by chance."""
@@ -204,11 +202,11 @@ def _evidence(
     index = np.concatenate([fixed, more]).astype(int)
     if not index.size:
         return 0.0
-    scaled, size = unit_diagonal(normal[np.ix_(index, index)], 1e-11)
+    scaled, size = unit_diagonal(normal[np.ix_(index, index)], REPEATED)
     wanted = right[index] / size
-    gain = 0.5 * float(wanted @ np.linalg.solve(scaled, wanted))
-    volume = 0.5 * float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum())
-    return gain - volume + 0.5 * float(np.log(ridge[more]).sum())
+    gain = float(wanted @ np.linalg.solve(scaled, wanted)) / 2.0
+    volume = float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum()) / 2.0
+    return gain - volume + float(np.log(ridge[more]).sum()) / 2.0
 
 
 def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -> Search:

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import outside, span_of
+from ..algebra.definite import REPEATED, outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
-from ..algebra.seed_systems import SINGULAR, Choice, Part, SeedSystems, evidence, parts, ranking
+from ..algebra.seed_systems import Choice, Part, SeedSystems, evidence, parts, ranking
 from ..algebra.workspace import Library, Workspace, merged
 from ..result import Site
 from .selection import backward, implausible, sites
@@ -89,7 +89,7 @@ class Sets:
         if asked not in self._worth:
             cost = sum(float(np.log(one.unit.trials)) + self.enter_log_bayes for one in chosen)
             normal, pull = self._equations(columns)
-            gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
+            gain = float(pull @ solve_scaled(normal, pull, REPEATED))
             freedom = float(len(columns))
             self._worth[asked] = evidence(self.systems.rss, gain, freedom, self.count) - cost
         return self._worth[asked]

@@ -10,7 +10,7 @@ from dataclasses import replace
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
-from ..algebra.problem import Model, Problem, Scale
+from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..algebra.workspace import Workspace
 from ..beliefs import Beliefs
 from ..evidence import CandidateSet, Search
@@ -20,8 +20,6 @@ from .library import build
 from .other_sets import AHEAD, Sets, reconsidered
 from .selection import backward, forward, implausible, possible, possible_part, sites
 
-SEARCH_ROWS = 9000
-"""Rows a search works on: what is found there is fitted again on all."""
 FIT_ROWS = 30000
 """Rows that a final fit works on; more only take time, as neighbours err alike."""
 ROUNDS = 3
@@ -43,7 +41,7 @@ def search(
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
     baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
     progress('baseline fitted')
-    few = problem.thinned(SEARCH_ROWS)
+    few = problem.thinned(ROWS)
     work, now, refused, crowded = _chosen(few, baseline.model, exclude, beliefs, progress)
     candidate_sets: tuple[CandidateSet, ...] = ()
     if not crowded:

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ..algebra.definite import EMPTY
 from ..beliefs import Beliefs
 from ..evidence import Row, Search, Verdict, marginal
 from ..result import Cause, Contributions, Shares, Site
@@ -72,7 +73,7 @@ def causes(
         whole = np.where(np.isnan(given), whole, given)
     else:
         whole, spread = _as_placed(whole, spread, given, placing)
-    noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
+    noise = min(floor**2 / max(float(squares[0].mean()), EMPTY), 1.0 - float(whole.sum()))
     remaining = max(1.0 - float(whole.sum()) - noise, 0.0)
     out = [
         _sized(claim, float(share), float(error))
@@ -124,7 +125,7 @@ def _as_placed(
         return whole, spread
     explained = max(float(whole[of_groups].sum()), float(parts.sum()))
     explained = min(explained, max(1.0 - float(whole[~of_groups].sum()), 0.0))
-    shares = parts * explained / max(float(parts.sum()), 1e-300)
+    shares = parts * explained / max(float(parts.sum()), EMPTY)
     error = np.hypot(spread, shares / max(placing.steady, 1.0))
     return np.where(of_groups, shares, whole), np.where(of_groups, error, spread)
 
@@ -306,11 +307,11 @@ def _shares(
 ) -> Array:
     """Return the share of every claim over some of the samples."""
     before, after = (float(s[keep].mean()) for s in squares)
-    explained = max(1.0 - after / max(before, 1e-300), 0.0)
+    explained = max(1.0 - after / max(before, EMPTY), 0.0)
     if not claims or not len(parts):
         return np.zeros(len(claims))
     sizes = np.maximum(parts[:, keep].mean(axis=1), 0.0)
-    total = max(float(sizes.sum()), 1e-300)
+    total = max(float(sizes.sum()), EMPTY)
     return np.array([explained * sizes[list(c.members)].sum() / total for c in claims])
 
 
@@ -351,7 +352,7 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     remaining = unseen.whole
     rest = unseen.bare - remaining - parts.sum(axis=0)
     sizes = (parts**2).mean(axis=1)
-    parts += rest * (sizes / max(float(sizes.sum()), 1e-300))[:, None]
+    parts += rest * (sizes / max(float(sizes.sum()), EMPTY))[:, None]
     metres = [unseen.problem.measured_rows(part, unseen.scale) for part in (remaining, *parts)]
     split = [[each[:, :3] for each in own] for own in metres]
     return Contributions(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import factored
+from ..algebra.definite import EMPTY, FLAT, factored
 from ..algebra.fit import Fit
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
@@ -25,15 +25,13 @@ from ..unseen.unseen_stretches import Base, Unseen
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""
-RIDGES = (1e-1, 1e1, 1e3)
+RIDGES = tuple(np.geomspace(1e-1, 1e3, 3).tolist())
 """Prior precision of the columns of a group in units of noise: from free to hardly there."""
 MOST = 6
 """More groups than this at once say that nothing simple is at work."""
 SHORTLIST = 6
 """Groups tried on unseen folds at every step, those that fit best in sample; the right one has
 not been seen below the fourth."""
-TRACE = 1e-9
-"""Share of a column's square that keeps the algebra whole where the data hardly show a frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +164,7 @@ class Choosing:
         """Return the groups that would fit best in sample beside what is fitted, best first."""
         columns = fitted.columns.written_out()
         normal = columns @ columns.T
-        normal[np.diag_indices_from(normal)] = normal.diagonal() * (1.0 + TRACE) + fitted.precision
+        normal[np.diag_indices_from(normal)] = normal.diagonal() * (1.0 + FLAT) + fitted.precision
         solve = factored(normal)
         rest = fitted.residual - solve(columns @ fitted.residual) @ columns
         falls = {}
@@ -217,7 +215,7 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
 def _worst_gain(before: list[Array], after: list[Array]) -> float:
     """Return the share of the squared error that falls, by the way that shows least."""
     return min(
-        1.0 - float(b.sum() / max(a.sum(), 1e-300)) for a, b in zip(before, after, strict=True)
+        1.0 - float(b.sum() / max(a.sum(), EMPTY)) for a, b in zip(before, after, strict=True)
     )
 
 
@@ -253,7 +251,7 @@ def worth(work: Choosing, members: list[Member]) -> Worth:
     less = [work.errors(members[:k] + members[k + 1 :]) for k in range(len(members))]
     losses = np.array([max(sum(float(e.sum()) for e in errors), 0.0) for errors in less])
     losses = np.maximum(losses - sum(float(e.sum()) for e in now), 0.0)
-    whole = max(float(losses.sum()), 1e-300)
+    whole = max(float(losses.sum()), EMPTY)
     return Worth(tuple(float(gain * loss / whole) for loss in losses), gain, steady)
 
 
@@ -275,7 +273,7 @@ def alternative_weights(
     own = (members[k], work.errors(members))
     tried = [own, *(pair for pair in work.entrants(rest) if pair[0].group != own[0].group)]
     totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
-    weights = (totals / max(totals.min(), 1e-300)) ** (-beliefs.group_rows / 4.0)
+    weights = (totals / max(totals.min(), EMPTY)) ** (-beliefs.group_rows / 4.0)
     # A group that needs fewer columns to do the same is the likelier one: freedom only helps.
     weights /= np.array([len(work.groups[m.group].columns) for m, _ in tried])
     weights /= weights.sum()

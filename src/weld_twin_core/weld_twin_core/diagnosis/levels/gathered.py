@@ -13,6 +13,7 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ...recording import Recording
+from ..algebra.definite import EMPTY
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Search
@@ -44,7 +45,7 @@ def gathered(
     """
     robot, parts = result.final.model.robot, unseen.targets[1:]
     total = parts.sum(axis=0)
-    whole = max(float(total @ total), 1e-300)
+    whole = max(float(total @ total), EMPTY)
     recordings = result.problem.recordings
     return Evidence(
         candidate_sets=result.candidate_sets,

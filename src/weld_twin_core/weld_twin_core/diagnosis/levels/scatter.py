@@ -26,7 +26,9 @@ from scipy.optimize import nnls
 from ...arrays import Array
 from ...effects.curves import QUANTITIES
 from ...twin.features import Features
+from ..algebra.definite import EMPTY, FLAT
 from ..algebra.independent_rows import measured_axes
+from ..algebra.noise_floor import THIRD
 from ..beliefs import Beliefs
 from ..evidence import Scatter, Search
 from ..unseen.folds import STRETCHES, jackknife
@@ -37,10 +39,6 @@ LEAST = 80
 GROSS = 6.0
 """Squared length over its median from which on a difference holds a stray reading: of three
 coordinates one in 500 does by chance."""
-THIRD = 20.0
-"""Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
-TINY = 1e-9
-"""Part of the diagonal added to a system of variances: two joints may move the tool alike."""
 
 
 def scattered(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Scatter, ...]:
@@ -80,7 +78,7 @@ def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
         Scatter(
             joint,
             float(whole[at] * sizes[at] / sizes[-1]),
-            float(whole[at] / max(error[at], 1e-300)),
+            float(whole[at] / max(error[at], EMPTY)),
         )
         for at, joint in enumerate(names, start=whole.size - len(names))
     ]
@@ -94,7 +92,7 @@ def _ways(maker: Features) -> Array:
     along = maker.run.poses.position.T
     beside = np.cross(along.T, (0.0, 0.0, 1.0)).T
     for k, way in enumerate((along, beside, np.cross(along.T, beside.T).T)):
-        sight[k, :3] = way / np.maximum(np.linalg.norm(way, axis=0), 1e-9)
+        sight[k, :3] = way / np.maximum(np.linalg.norm(way, axis=0), FLAT)
     joints = range(maker.twin.robot.n)
     columns = [maker.column(('q', i)) for i in joints]
     velocity = np.sum([column * view.qd[:, i] for i, column in enumerate(columns)], axis=0)
@@ -123,11 +121,11 @@ def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
 
 def _shared_out(normal: Array, right: Array) -> Array:
     """Return the variances along every way, none below zero, shape (K,)."""
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(normal), EMPTY))
     live = np.diag(normal) > 0.0
     out = np.zeros(right.size)
     scaled = (normal / np.outer(size, size))[np.ix_(live, live)]
-    half = cholesky(scaled + TINY * np.eye(len(scaled)), lower=True)
+    half = cholesky(scaled + FLAT * np.eye(len(scaled)), lower=True)
     out[live] = nnls(half.T, solve_triangular(half, (right / size)[live], lower=True))[0]
     return np.asarray(out / size)
 

@@ -19,6 +19,7 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
+from ..algebra.definite import EMPTY, ROUNDING
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..evidence import Search
@@ -83,11 +84,11 @@ def _by_chance(few: Search, many: Search, before: float, remaining: float) -> bo
     before, remaining: what few and many leave unseen; see `unseen_rms`.
     """
     fitted, own = (Unseen.of(s.problem, s.scale, s.final, s.precision) for s in (many, few))
-    share = 1.0 - (remaining / max(before, 1e-12)) ** 2
+    share = 1.0 - (remaining / max(before, ROUNDING)) ** 2
     if not may_be_chance(fitted.residual.size, share):
         return False
     columns, frames = fitted.columns.written_out(), fitted.frames
-    size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
+    size = np.sqrt(np.maximum(fitted.precision, EMPTY))[:, None]
     # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
     tried = Candidates(
         own.columns.written_out(),

@@ -25,7 +25,7 @@ from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage
 from ...twin.features import Features, joints_of
 from ..algebra.columns import Maker, Piece, designed
-from ..algebra.definite import outside, share_outside, span_of
+from ..algebra.definite import FLAT, outside, share_outside, span_of
 from ..algebra.fit import (
     Fit,
     coordinates,
@@ -197,7 +197,7 @@ class Lines:
         size = 1.0 if piece.joint is None else np.sqrt(piece.joint.square)
         pairs = (piece.each * size).reshape(orders.size, 2, -1)
         normal = pairs @ np.swapaxes(pairs, 1, 2)
-        normal += 1e-9 * np.eye(2) * np.trace(normal[0])
+        normal += FLAT * np.eye(2) * np.trace(normal[0])
         apart = float(np.ceil(np.pi / (high - low)))
         out = cls(orders, np.ones(orders.size, dtype=bool), piece, normal, apart)
         for order in ripple.search.orders():
@@ -355,7 +355,7 @@ class Sizes:
             self.believed,
         )
         ridge = np.concatenate([np.zeros(frames), precision])
-        step = solve_scaled(normal + np.diag(ridge), right - ridge * now, 1e-9)
+        step = solve_scaled(normal + np.diag(ridge), right - ridge * now, FLAT)
         return precision, freedom, step
 
 

@@ -26,10 +26,11 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.any_motion import same_error
+from ..algebra.noise_floor import NANOMETRE
 from ..beliefs import Beliefs
 from ..evidence import Search
 from ..result import Family, Site
-from ..unseen.folds import TINY, growth, means, parts_of
+from ..unseen.folds import growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen
 from .small_errors import believed
 
@@ -52,8 +53,8 @@ def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[
             out.append(case.weighed(name, chosen, tuple(sizes)))
     # Their shares are of what those chosen take off together.
     bare, remaining = (case.mean_square(kept) for kept in ((), case.of_kinds(chosen)))
-    explained = max(1.0 - remaining / max(bare, TINY**2), 0.0)
-    whole = max(sum(one.rms_m**2 for one in out if one.chosen), TINY**2)
+    explained = max(1.0 - remaining / max(bare, NANOMETRE**2), 0.0)
+    whole = max(sum(one.rms_m**2 for one in out if one.chosen), NANOMETRE**2)
     return tuple(
         replace(one, share=explained * one.rms_m**2 / whole) if one.chosen else one for one in out
     )

@@ -29,7 +29,7 @@ from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.open_directions import VISIBLE, open_directions
-from ..algebra.problem import Model, Problem, Scale
+from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
@@ -38,8 +38,6 @@ from .dispersion import dispersion
 from .leftover import Predicted, known_noise, leftover
 from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
-ROWS = 9000
-"""Rows looked at; more show the same directions."""
 POSTURES = 200
 """Enough for a median to be good to some per cent."""
 LEAST = 1e-6

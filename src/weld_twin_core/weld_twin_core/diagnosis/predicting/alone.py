@@ -67,7 +67,7 @@ def alone(
     out = Alone((), recorded, unseen, whole, shrink.rms_after_m)
     if not _left(model):
         return out
-    scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3.0)))
+    scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3)))
     best, left = None, unseen
     # Aligned frames mean nothing of the arm, so they are where they do best.
     for start, gain in ((_framed(constants), 1.0), (_freed(constants, many=many), LEAST_GAIN)):

@@ -23,6 +23,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...arrays import Array
+from ..algebra.definite import EMPTY, FLAT
 from .sizes import Products
 
 Rooted = Callable[[Products], tuple[Array, Array]]
@@ -32,8 +33,6 @@ USUAL = 0.5
 arms are seldom off by twice what they say."""
 FACTORS = np.exp(np.linspace(-2.0, 2.0, 81))
 """Dispersions that are weighed: four standard deviations to either side."""
-ROUNDING = 1e-9
-"""Share of the largest variance below which a direction is certain."""
 
 
 def dispersion(parts: Sequence[Products], noise: float, models: Sequence[Rooted]) -> float:
@@ -49,9 +48,9 @@ def dispersion(parts: Sequence[Products], noise: float, models: Sequence[Rooted]
         for part in parts:
             off, variance = _along(part, *rooted(part))
             whole = FACTORS[:, None] * variance + noise
-            own -= 0.5 * (off**2 / whole + np.log(whole)).sum(axis=1)
+            own -= (off**2 / whole + np.log(whole)).sum(axis=1) / 2.0
     weights = np.exp(likely - likely.max(axis=1, keepdims=True)).mean(axis=0)
-    weights *= np.exp(-0.5 * (np.log(FACTORS) / USUAL) ** 2)
+    weights *= np.exp(-((np.log(FACTORS) / USUAL) ** 2) / 2.0)
     return float(weights @ FACTORS / weights.sum())
 
 
@@ -59,6 +58,6 @@ def _along(part: Products, mean: Array, root: Array) -> tuple[Array, Array]:
     """Return errors of rows along the directions in which they are foretold, and their variances."""
     error = root.T @ (part.residual - part.columns @ mean)
     variance, turn = np.linalg.eigh(root.T @ part.columns @ root)
-    open_ = variance > ROUNDING * max(float(variance[-1]), 1e-300)
+    open_ = variance > FLAT * max(float(variance[-1]), EMPTY)
     variance = variance[open_]
     return (turn[:, open_].T @ error) / np.sqrt(variance), variance

@@ -24,9 +24,9 @@ from scipy.special import chdtri
 from ...arrays import Array
 from ...recording import Recording
 from ...twin.reversals import just_turned
-from ..algebra.definite import unit_diagonal
+from ..algebra.definite import EMPTY, REPEATED, unit_diagonal
 from ..algebra.fit import trusted
-from ..algebra.noise_floor import NoiseFloor
+from ..algebra.noise_floor import NANOMETRE, NoiseFloor
 from ..algebra.problem import Problem
 from ..unseen.unseen_stretches import Unseen
 from .sizes import Products
@@ -38,7 +38,7 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 ROUGH = 0.5
 """Share of small errors of a usual size from which on all that is left is the arm's. A judgement: of two
 real arms under a tracker it is 0.3 to 0.6, and their stations repeat better than models predict."""
-NEIGHBOURS = (2, 8, 32, 128)
+NEIGHBOURS = tuple((2 * 4 ** np.arange(4)).tolist())
 """Samples that are looked at together for what they have in common: two show what changes from one to
 the next, a hundred what is a tenth of the noise."""
 AGREED = 2.5
@@ -47,8 +47,6 @@ agreeing or not, chance gets so far once in twenty at the most."""
 IN_COMMON = np.logspace(-8.0, 0.0, 161)
 """Parts of what is left that neighbours may have in common. Before the data every decade is as likely as
 every other, down to that of a ten-thousandth of the size, which is none (`sizes.SIZES`)."""
-ROUNDING = 1e-10
-"""Added to a covariance of unit diagonal, so that it stays definite where its inverse hardly is."""
 MOST = 800
 """Samples that tell what is left over; more say the same."""
 LONE = 3.0
@@ -62,7 +60,7 @@ STEPS = 60
 
 FEW = 12
 """Samples after turns of a joint below which they tell nothing of what is left there."""
-PEAK = 1.7321
+PEAK = np.sqrt(3)
 """Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
 STRAYED = 1.5
 """Times what chance makes of the largest miss in a fold from which on it is more than chance: the
@@ -178,7 +176,7 @@ def _by_others(unseen: Unseen, columns: Array, parts: Sequence[Products], given:
 
 def _ways(covariance: Array, columns: Array) -> Array:
     """Return in which ways rows may be off, each of one standard deviation, shape (P, rows)."""
-    scaled, size = unit_diagonal(covariance, ROUNDING)
+    scaled, size = unit_diagonal(covariance, REPEATED)
     return np.asarray((np.linalg.cholesky(scaled).T * size) @ columns)
 
 
@@ -249,8 +247,8 @@ def _peaks(predicted: Predicted) -> Array:
     out = []
     for region in np.unique(regions):
         here = off[regions == region]
-        usual = np.median(here) / float(chdtri(3.0, 0.5))
-        chance = usual * float(chdtri(3.0, 1.0 - 0.5 ** (1.0 / here.size)))
+        usual = np.median(here) / float(chdtri(3, 0.5))
+        chance = usual * float(chdtri(3, 1.0 - 0.5 ** (1.0 / here.size)))
         strayed = here.max() > STRAYED**2 * chance
         out.append(np.sqrt(here.max() - chance) if strayed else 0.0)
     return np.array(out)
@@ -274,14 +272,14 @@ def _at_turns(problem: Problem, predicted: Predicted, lost: Array) -> Array:
     near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[use]
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
-        out[i] = lost[i] / np.sqrt(3.0)
+        out[i] = lost[i] / np.sqrt(3)
         if min(here.size, beside.size) < FEW:
             continue
         doubt = CLEAR * np.sqrt(here.var() / here.size + beside.var() / beside.size)
         more = here.mean() - beside.mean()
         if more <= doubt:
             size = (predicted.levers[i, use, :3][near[:, i]] ** 2).mean()
-            out[i] = min(out[i], PEAK * np.sqrt(max(more + doubt, 0.0) / max(size, 1e-300)))
+            out[i] = min(out[i], PEAK * np.sqrt(max(more + doubt, 0.0) / max(size, EMPTY)))
     return out
 
 
@@ -308,7 +306,7 @@ def _of_the_arm(
     if noise is None:
         common += alone * min(rough / ROUGH, 1.0)
     elif at_rest:
-        common += max(alone - noise**2 / max(remaining, 1e-300), 0.0)
+        common += max(alone - noise**2 / max(remaining, EMPTY), 0.0)
     return float(np.sqrt(common))
 
 
@@ -341,8 +339,8 @@ def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bo
     for gears, price in ((turning * 1.0, 0.0), *((one, cost) for one in singles)):
         moved = levers * gears
         lever = np.einsum('kin,kjn->kij', moved, moved)
-        reach = max(float(np.trace(lever, axis1=1, axis2=2).mean()) / 3.0, 1e-300)
-        for share in SHARES if reach > 1e-300 else SHARES[:1]:
+        reach = max(float(np.trace(lever, axis1=1, axis2=2).mean()) / 3, EMPTY)
+        for share in SHARES if reach > EMPTY else SHARES[:1]:
             shape = (1.0 - share) * np.eye(3) + share * lever / reach
             size = _size(errors, moments, shape)
             likely = _likelihood(errors, moments + size**2 * shape) - price * (share > 0.0)
@@ -355,9 +353,9 @@ def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bo
 
 def _likelihood(errors: Array, covariances: Array) -> float:
     """Return how likely errors (K, 3) of given covariances (K, 3, 3) are, as a logarithm."""
-    whole = covariances + 1e-18 * np.eye(3)
+    whole = covariances + NANOMETRE**2 * np.eye(3)
     solved = np.linalg.solve(whole, errors[..., None])[..., 0]
-    return -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
+    return -float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum()) / 2.0
 
 
 def _in_common(problem: Problem, predicted: Predicted) -> float:
@@ -395,7 +393,7 @@ def _in_common(problem: Problem, predicted: Predicted) -> float:
         square, each_open = total[3:5] / max(total[5], 1.0) * (1.0, sign)
         chance = np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
         common = max(agree - open_, min(open_, 0.0) - agree)
-        whole, chance = max(square - each_open, common, 1e-300), max(chance, 1e-300)
+        whole, chance = max(square - each_open, common, EMPTY), max(chance, EMPTY)
         estimates.append((common / chance, chance / whole, (agree - open_) / whole))
     if not estimates:
         return float(not predicted.at_rest)
@@ -407,8 +405,8 @@ def _in_common(problem: Problem, predicted: Predicted) -> float:
 
 def _believed(chance: float, common: float) -> float:
     """Return the mean of `IN_COMMON` given what is seen in common, and its standard error."""
-    likely = np.exp(-0.5 * ((common - IN_COMMON) / chance) ** 2)
-    return float(likely @ IN_COMMON / max(float(likely.sum()), 1e-300))
+    likely = np.exp(-(((common - IN_COMMON) / chance) ** 2) / 2.0)
+    return float(likely @ IN_COMMON / max(float(likely.sum()), EMPTY))
 
 
 def _neighbours(
@@ -440,23 +438,25 @@ def _postures(recording: Recording) -> Array:
 
 def _size(errors: Array, moments: Array, shape: Array) -> float:
     """Return the factor of a shape's root that makes regions hold as many errors as they shall."""
-    limit = float(chdtri(3.0, 1.0 - HOLD))
+    limit = float(chdtri(3, 1.0 - HOLD))
     # Of few errors the largest say more of those to come than their count: conformal level.
     wanted = min(HOLD * (1.0 + 1.0 / len(errors)), 1.0)
 
     # On the axes in which both are diagonal, every size asked for costs a division.
     root = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(shape, moments.shape)))
-    spread, turn = np.linalg.eigh(root @ (moments + 1e-18 * np.eye(3)) @ np.swapaxes(root, -1, -2))
+    spread, turn = np.linalg.eigh(
+        root @ (moments + NANOMETRE**2 * np.eye(3)) @ np.swapaxes(root, -1, -2)
+    )
     along = (np.swapaxes(turn, -1, -2) @ (root @ errors[..., None]))[..., 0] ** 2
 
     def held(variance: float) -> float:
         return float(np.mean((along / (spread + variance)).sum(axis=1) <= limit))
 
-    low, high = 0.0, 100.0 * float((errors**2).sum(axis=1).max()) + 1e-18
+    low, high = 0.0, 100.0 * float((errors**2).sum(axis=1).max()) + NANOMETRE**2
     if held(low) >= wanted:
         return 0.0
     for _ in range(STEPS):
-        middle = 0.5 * (low + high)
+        middle = (low + high) / 2.0
         low, high = (low, middle) if held(middle) >= wanted else (middle, high)
     return float(np.sqrt(high))
 

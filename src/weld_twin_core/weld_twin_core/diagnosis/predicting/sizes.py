@@ -32,7 +32,7 @@ from scipy.linalg.blas import dgemm, dger
 from scipy.linalg.lapack import dtrtrs
 
 from ...arrays import Array
-from ..algebra.definite import inverse_of, root_of
+from ..algebra.definite import EMPTY, ROUNDING, inverse_of, root_of
 from ..algebra.fit import NOISE_TRUST
 
 SIZES = np.array([0.0001, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
@@ -48,8 +48,6 @@ OPEN = 0.05
 judgement, for noise leaves nothing to be told by a twentieth."""
 USUAL = 0.3
 """Size from which on an error is one that machines usually have."""
-ROUNDING = 1e-12
-"""Share of the largest variance below which a direction is certain."""
 SWEEPS, LEARNING = 100, 20
 """Models drawn, and those until the chain has forgotten its start: on six sealed cells means of three
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
@@ -152,7 +150,7 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     seen, width = chain.seen, prior.width
     mean = seen.mean / seen.count
     covariance = seen.square / seen.count - np.outer(mean, mean)
-    covariance = 0.5 * (covariance + covariance.T) * np.outer(width, width)
+    covariance = (covariance + covariance.T) / 2.0 * np.outer(width, width)
     return Weighed(
         width * mean,
         covariance,
@@ -225,7 +223,7 @@ class _Chain:
         self.counted = self.single.copy()
         self.counted[[each[0] for each in self.tied]] = True
         # What was found is as large as it was found, for the chain may come upon it late.
-        off = np.log(np.maximum(np.abs(self.middle), 1e-300))[:, None] - np.log(SIZES)
+        off = np.log(np.maximum(np.abs(self.middle), EMPTY))[:, None] - np.log(SIZES)
         start = np.where(self.middle == 0.0, SIZES[2], SIZES[np.abs(off).argmin(axis=1)])
         self.size, self.noise = np.where(self.small, start, 1.0), self.expected
         self.belief = np.tile(BELIEF, (prior.gears.size, 1))
@@ -308,7 +306,7 @@ class _Chain:
             seen, off = max(1.0 / variance - old, 0.0), float(mean[j] - self.middle[j])
             pull = (off / variance) ** 2
             likely = [
-                one + 0.5 * (pull * square / (1.0 + square * seen) - log(1.0 + square * seen))
+                one + (pull * square / (1.0 + square * seen) - log(1.0 + square * seen)) / 2.0
                 for square, one in zip(squares, own, strict=True)
             ]
             self.size[j] = SIZES[likely.index(max(likely))]
@@ -330,7 +328,7 @@ class _Chain:
         variance = np.maximum(variance, ROUNDING * variance[-1])
         squares, seen = SIZES[:, None] ** 2, np.maximum(1.0 / variance - old, 0.0)
         pull, grown = (turn.T @ off) / variance, 1.0 + squares * seen
-        likely = 0.5 * (pull**2 * squares / grown - np.log(grown)).sum(axis=1)
+        likely = (pull**2 * squares / grown - np.log(grown)).sum(axis=1) / 2.0
         likely += np.log(self.belief[self.prior.group[group[0]]])
         self.size[group] = SIZES[(likely + self.rng.gumbel(size=likely.size)).argmax()]
         more = self.size[group[0]] ** -2.0 - old
@@ -352,5 +350,5 @@ class _Chain:
         for part in (gears, ~gears):
             common = counts[part].sum(axis=0) + POOLED * BELIEF
             drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
-            drawn = np.maximum(drawn, 1e-300)
+            drawn = np.maximum(drawn, EMPTY)
             self.belief[part] = drawn / drawn.sum(axis=1, keepdims=True)

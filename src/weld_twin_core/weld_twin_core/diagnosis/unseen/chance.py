@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.definite import FLAT, Index, unit_diagonal
+from ..algebra.definite import EMPTY, FLAT, REPEATED, Index, unit_diagonal
 from ..algebra.noise_floor import spread_of
 
 DRAWS = 100
@@ -33,8 +33,6 @@ part, which is what is asked for."""
 CLEAR = 80.0
 """Rows times logarithm of the fall, from which on nothing is drawn: the best of a hundred groups of ten
 columns reaches a chi-square of 45 once in ten thousand times."""
-DAMPING = 1e-11
-"""Of columns that repeat others, far below what a fit can tell."""
 SEED = 3
 """Of the drawings: the same recordings give the same answer."""
 
@@ -62,7 +60,7 @@ def noise(rows: int) -> Array:
 
 def may_be_chance(rows: int, gain: float) -> bool:
     """Return whether the best of many candidates could have gained a share of so many rows of noise."""
-    return rows <= FEW and -rows * float(np.log(max(1.0 - gain, 1e-300))) <= CLEAR
+    return rows <= FEW and -rows * float(np.log(max(1.0 - gain, EMPTY))) <= CLEAR
 
 
 def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) -> float:
@@ -85,7 +83,7 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
 
 def _noise_left(columns: Array, precision: Array) -> tuple[Array, Array]:
     """Return what a fit leaves of unit rows, (rows, rows), and of drawings of noise, (rows, DRAWS)."""
-    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
+    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), REPEATED)
     unit = columns / size[:, None]
     rest = np.eye(columns.shape[1]) - unit.T @ np.linalg.solve(system, unit)
     return rest, rest @ noise(columns.shape[1]).T

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ..algebra.definite import EMPTY
+from ..algebra.noise_floor import NANOMETRE
 from ..algebra.problem import PLACES, Problem
 
 STRETCHES = 8
 """Folds in time: enough for a standard error, few enough that each shows much."""
-TINY = 1e-9
-"""Least error [m] divided by: a nanometre, far below any instrument."""
 MOST_IN_ONE = 0.5
 """Share of a recording in one region from which on the others do not show its base."""
 
@@ -42,7 +42,7 @@ def ways_to_divide(problem: Problem, folds: int = STRETCHES) -> list[Array]:
     return [by_time, posture_regions(problem)]
 
 
-def posture_regions(problem: Problem, halvings: int = 3) -> Array:
+def posture_regions(problem: Problem) -> Array:
     """
     Return the region of posture of every row, int, shape (rows,).
 
@@ -50,8 +50,6 @@ def posture_regions(problem: Problem, halvings: int = 3) -> Array:
     halves again, so that every region holds as many and lies in one part of the joint space. Where
     recordings have bases of their own, one that lies in one region for the most part is dealt out
     over all of them: its base could not be told from the other regions.
-
-    halvings: 2 to this power is the number of regions.
     """
     postures = np.concatenate(
         [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
@@ -61,7 +59,7 @@ def posture_regions(problem: Problem, halvings: int = 3) -> Array:
         [r.measured.position.T for r in problem.recordings if r.measured is not None], axis=1
     )
     labels = np.zeros(postures.shape[0], dtype=int)
-    for _ in range(halvings):
+    for _ in range(int(np.log2(STRETCHES))):
         after = labels * 2
         for name in np.unique(labels):
             here = np.flatnonzero(labels == name)
@@ -112,7 +110,9 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     names = np.intersect1d(labels, others)
     one, two = means(before, labels)[names], means(after, others)[names]
     was, remaining = float(before.mean()), float(after.mean())
-    return Gain((was - remaining) / max(was, 1e-300), steadiness(one, two), remaining**0.5)
+    return Gain(
+        (was - remaining) / max(was, EMPTY), steadiness(one, two), float(np.sqrt(remaining))
+    )
 
 
 def means(values: Array, labels: NDArray[Any]) -> Array:
@@ -124,7 +124,7 @@ def steadiness(before: Array, after: Array) -> float:
     """Return the mean fall over the parts in its standard errors."""
     fall = before - after
     error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
-    return float(fall.mean() / max(error, 1e-300))
+    return float(fall.mean() / max(error, EMPTY))
 
 
 def parts_of(labels: Sequence[Array]) -> NDArray[np.intp]:
@@ -151,7 +151,7 @@ def growth(before: Array, after: Array, parts: NDArray[np.intp]) -> Array:
     parts: of every sample, shape (samples,).
     """
     was, now, mean = (means(values, parts) for values in (before, after, after - before))
-    out = np.sqrt(now) / np.maximum(np.sqrt(was), TINY) - 1.0
+    out = np.sqrt(now) / np.maximum(np.sqrt(was), NANOMETRE) - 1.0
     spread = means((after - before - mean[parts]) ** 2, parts)
     error = np.sqrt(spread / np.maximum(np.bincount(parts) - 1, 1))
     return np.where((out < 0.0) & (mean > -error), 0.0, out)

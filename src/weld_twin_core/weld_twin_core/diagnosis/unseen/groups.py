@@ -29,6 +29,7 @@ from ...effects.effect import Effect
 from ...effects.pedestal_tilt import PedestalTilt, base_leans, base_moments
 from ...twin.features import Features
 from ...twin.memory import Picker
+from ..algebra.definite import FLAT, ROUNDING
 from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
@@ -130,8 +131,8 @@ def _spanned(
     columns = problem.whitened(parts, scale)
     size = np.sqrt((columns**2).mean(axis=1))
     if not curves:
-        columns, size = columns[size > 1e-12], size[size > 1e-12]
-    if size.max(initial=0.0) > 1e-12:
+        columns, size = columns[size > ROUNDING], size[size > ROUNDING]
+    if size.max(initial=0.0) > ROUNDING:
         # Knots that little was recorded at keep their small columns, or a ridge would free them.
         size = np.maximum(size, 0.2 * size.max())
         yield Group(at, on, curves, columns / size[:, None], size, carriers)
@@ -244,7 +245,7 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
         if knots is not None:
             each = [(_grown(maker)[None], w) for maker, w in zip(features, warmth, strict=True)]
             yield 'base', 'temperature', [g * basis(knots, w)[:, None] for g, w in each], ()
-            middle = 0.5 * (knots[0] + knots[-1])
+            middle = (knots[0] + knots[-1]) / 2.0
             yield 'base', 'temperature', [g * (w - middle) for g, w in each], ()
 
 
@@ -268,7 +269,7 @@ def _velocity(maker: Features) -> Array:
 def smooth_field(maker: Features) -> Array:
     """Return every coordinate of the position over the place, up to its squares, (FIELD, 6, M)."""
     p = maker.run.poses.position
-    x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
+    x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), FLAT)).T
     shapes = [*x, *(x[a] * x[b] for a in range(3) for b in range(a, 3))]
     out = np.zeros((3, len(shapes), 6, x.shape[1]))
     for axis in range(3):
@@ -370,7 +371,7 @@ def _lost(maker: Features, features: list[Features], index: int) -> Array:
     widths = unit * np.array([*GAPS, TURNED])[:, None]
     trails = play(q, widths, np.full(len(widths), q[0])) - q
     trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
-    way = trails[-1] / (-0.5 * widths[-1])
+    way = trails[-1] / (-widths[-1] / 2.0)
     angles = [m.view.q[:, index] for m in features]
     knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
     speed = view.qd[:, index]

@@ -13,13 +13,14 @@ import numpy as np
 from ...arrays import Array
 from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
+from ..algebra.definite import EMPTY
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.places import by_place, posed
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
 from ..evidence import Search
 from ..result import Shrink
-from .folds import jackknife, posture_regions
+from .folds import STRETCHES, jackknife, posture_regions
 from .unseen_stretches import Unseen
 
 STUDENT = 2.36
@@ -78,7 +79,7 @@ def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> f
 def _log_sizes(squares: Array, labels: Array) -> Array:
     """Return the logarithm of an RMS with each fold left out in turn."""
     means = [squares[labels != name].mean() for name in np.unique(labels)]
-    return np.asarray(0.5 * np.log(np.maximum(means, 1e-300)))
+    return np.asarray(np.log(np.maximum(means, EMPTY)) / 2.0)
 
 
 class Judged(NamedTuple):
@@ -149,7 +150,7 @@ def _on_bags(
             for first, last in _on_contacts(result, recording):
                 before.append(first)
                 after.append(last)
-                labels.append(np.full(first.size, 8 * len(labels)))
+                labels.append(np.full(first.size, STRETCHES * len(labels)))
             continue
         problem = Problem((usable(recording),), frozenset({'base'}) & result.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
@@ -163,8 +164,8 @@ def _on_bags(
             good = trusted(robust_scale(problem, parts).weights, max(few, 1))[0]
         before.append(pair[0][good])
         after.append(pair[1][good])
-        fold = np.arange(good.sum()) * 8 // max(int(good.sum()), 1)
-        labels.append(fold + 8 * len(labels))
+        fold = np.arange(good.sum()) * STRETCHES // max(int(good.sum()), 1)
+        labels.append(fold + STRETCHES * len(labels))
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
 
 
@@ -235,13 +236,13 @@ def ratio_interval(
     elsewhere: the same ratio on other recordings.
     farthest: logarithm of a ratio between the two beyond which it widens the interval no further.
     """
-    ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
+    ratio = float(np.sqrt(after.mean() / max(before.mean(), EMPTY)))
     if np.unique(labels).size < FEWEST:
         spread = ratio / np.sqrt(2.0 * max(before.size, 2))
         return ratio, (max(ratio - 2.0 * spread, 0.0), ratio + 2.0 * spread)
     variance = float(jackknife(_log_sizes(after, labels) - _log_sizes(before, labels)))
     if elsewhere is not None:
-        apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
+        apart = np.log(max(elsewhere, EMPTY) / max(ratio, EMPTY))
         variance += min(abs(float(apart)), farthest) ** 2
     reach = STUDENT * np.sqrt(variance)
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

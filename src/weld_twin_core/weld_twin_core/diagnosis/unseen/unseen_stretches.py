@@ -28,21 +28,17 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
-from ..algebra.definite import Index, factored, inverted, unit_diagonal
+from ..algebra.definite import EMPTY, FLAT, REPEATED, Index, factored, inverted, unit_diagonal
 from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import chosen_anew
 from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
-DAMPING = 1e-11
-"""Of columns that repeat others, far below what a fit can tell."""
 ROUNDED = 1e-13
 """Share of a column's sum of squares that is rounding once a stretch is taken off it: some hundred
 times what one difference of doubles loses."""
-RIDGES = (1e-2, 1.0, 1e2, 1e4)
+RIDGES = tuple(np.geomspace(1e-2, 1e4, 4).tolist())
 """Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
-ZERO = 1e-140
-"""Norm of a column that counts as none; keeps its square from becoming infinite."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 MOST_STEPS = 1e6
@@ -213,9 +209,9 @@ class Unseen:
         """Return the inverse of all normal equations without every stretch."""
         out = []
         for b in range(len(self.spans)):
-            system, size = unit_diagonal(self._system(b, np.arange(self.columns.count)), DAMPING)
+            system, size = unit_diagonal(self._system(b, np.arange(self.columns.count)), REPEATED)
             # A base that only one stretch shows has columns of zeros without it; it stays put.
-            unit = np.where(size > ZERO, 1.0 / size, 0.0)
+            unit = np.where(size > np.sqrt(EMPTY), 1.0 / size, 0.0)
             out.append(inverted(system) * unit[:, None] * unit)
         return out
 
@@ -252,7 +248,7 @@ class Unseen:
         """Return what solves the normal equations of some columns without one stretch."""
         if index.size == self.columns.count > MANY:
             return partial(np.matmul, self._inverses[b])
-        system, size = unit_diagonal(self._system(b, index), DAMPING)
+        system, size = unit_diagonal(self._system(b, index), REPEATED)
         solve = factored(system)
 
         def solved(right: Array) -> Array:
@@ -347,10 +343,10 @@ class Unseen:
         ratios = np.zeros((len(self.spans), every.size))
         for b in range(len(self.spans)):
             remaining = self._system(b, every)
-            system, size = unit_diagonal(remaining.copy(), DAMPING)
+            system, size = unit_diagonal(remaining.copy(), REPEATED)
             step = factored(system)(self._right(b, mix, range(len(self.parts))) / size) / size
             more = np.maximum(_spread(remaining) - whole, ROUNDED * whole)
-            ratios[b] = step**2 / np.maximum(more, 1e-300)
+            ratios[b] = step**2 / np.maximum(more, EMPTY)
         reported = np.minimum(ratios, MOST_STEPS).mean(axis=0)
         out = np.array([reported[part].max(initial=0.0) for part in self.parts])
         for k, moved in self._anew.items():
@@ -374,7 +370,7 @@ class Unseen:
 
     def _beside(self, rows: Array) -> Array:
         """Return the squares of rows, (R, rows), that no column of the model can take up, (R,)."""
-        system, size = unit_diagonal(self._total.copy(), DAMPING)
+        system, size = unit_diagonal(self._total.copy(), REPEATED)
         along = self.columns.products(rows) / size[:, None]
         taken = (along * factored(system)(along)).sum(axis=0)
         return np.asarray(np.maximum((rows**2).sum(axis=1) - taken, 0.0))
@@ -388,7 +384,7 @@ class Unseen:
         """
         out = []
         for root, part in zip(self.problem.roots, self.problem.by_sample(residual), strict=True):
-            rows = part[:, :3] if root is None else part * np.sqrt(3.0 / part.shape[1])
+            rows = part[:, :3] if root is None else part * np.sqrt(3 / part.shape[1])
             out.append((rows**2).sum(axis=1) * self.scale.position**2)
         return np.concatenate(self._trusted(out)) / self._trusted_weights
 
@@ -478,7 +474,7 @@ class Base:
                 solved = self.solvers[b](np.column_stack([cross, right]))
                 square = square - cross.T @ solved[:, :-1]
                 pull = pull - cross.T @ solved[:, -1]
-            held = square + (np.array(ridges)[:, None, None] + 1e-9) * np.eye(here.shape[0])
+            held = square + (np.array(ridges)[:, None, None] + FLAT) * np.eye(here.shape[0])
             more = np.linalg.solve(held, pull[:, None])[..., 0]
             outs[:, rows] -= more @ here
             if self.index.size:
@@ -507,7 +503,7 @@ def _searched(problem: Problem, scale: Scale, model: Model, labels: bytes) -> di
 
 def _spread(normal: Array) -> Array:
     """Return the variance of every coordinate, (P,), in units of noise."""
-    system, size = unit_diagonal(normal.copy(), DAMPING)
+    system, size = unit_diagonal(normal.copy(), REPEATED)
     return np.asarray(np.diag(factored(system)(np.eye(size.size))) / size**2)
 
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..algebra.definite import EMPTY, ROUNDING
 from ..algebra.fit import Fit, trusted
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
@@ -111,7 +112,7 @@ def _path(
             index = part[kept[part]]
             if index.size:
                 t = recording.seen.t[index]
-                share = float(squares[index].sum()) / max(total, 1e-300)
+                share = float(squares[index].sum()) / max(total, EMPTY)
                 rms = float(np.sqrt(squares[index].mean()))
                 out.append((float(t[0]), float(t[-1]), share, rms))
     return tuple(out)
@@ -129,9 +130,9 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
         if not recording.joints.static and error.shape[0] > 2:
             travel = np.gradient(poses.position, maker.at, axis=0)
         size = np.linalg.norm(travel, axis=1, keepdims=True)
-        along = np.where(size > 1e-6, travel / np.maximum(size, 1e-12), 0.0)
+        along = np.where(size > 1e-6, travel / np.maximum(size, ROUNDING), 0.0)
         normal = normal - along * (normal * along).sum(axis=1, keepdims=True)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), ROUNDING)
         a, c = (error * along).sum(axis=1)[kept], (error * normal).sum(axis=1)[kept]
         across = np.maximum((error[kept] ** 2).sum(axis=1) - a**2 - c**2, 0.0)
         sums += [float((a**2).sum()), float(across.sum()), float((c**2).sum())]
@@ -164,7 +165,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
             # Waves of a gear stand by themselves.
             waves = group.on == 'angle' and len(group.columns) == FINE
             key = group.at, 'waves' if waves else group.on
-            of_gap[key] = max(of_gap.get(key, 0.0), float(1.0 - after / max(before, 1e-300)))
+            of_gap[key] = max(of_gap.get(key, 0.0), float(1.0 - after / max(before, EMPTY)))
         if _tells(group, at_joint=group.at in joints) and (elsewhere or group.at in joints):
             found.append((base.gain(group.columns), group))
     if not found:

@@ -15,11 +15,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..beliefs import Beliefs
-from ..evidence import CandidateSet, Evidence, Left, Verdict, named_together
+from ..evidence import LIKELIER, CandidateSet, Evidence, Left, Verdict, named_together
 from ..result import Family, Site
 
-LIKELIER = 0.5
-"""Probability from which on a cause counts as named: it is likelier right than wrong."""
 LISTED = 8
 """Readings that a sentence lists one by one at the most."""
 NO_GAP = 'there is no gap above the noise'

@@ -169,7 +169,7 @@ def outliers():
 def test_five_per_cent_of_gross_errors_do_not_move_a_robust_fit(outliers):
     problem, model, _ = outliers
     plain = fit(problem, model, known_scale(problem))
-    found, scale = robust_fit(problem, model, problem.unit_scale())
+    found, scale = robust_fit(problem, model)
     error = errors_of(problem, found.model, scale)[0]
     assert abs(found.coordinates[0] - 5e-4) < 3.0 * error
     assert abs(plain.coordinates[0] - 5e-4) > 3.0 * error
@@ -177,7 +177,7 @@ def test_five_per_cent_of_gross_errors_do_not_move_a_robust_fit(outliers):
 
 def test_gross_errors_are_distrusted_and_good_samples_keep_their_weight(outliers):
     problem, model, off = outliers
-    _, scale = robust_fit(problem, model, problem.unit_scale())
+    _, scale = robust_fit(problem, model)
     weights = scale.weights[0]
     assert (weights[off] < TRUSTED).all()
     assert np.mean(weights[~off] == 1.0) > 0.99
@@ -214,7 +214,7 @@ def test_few_stations_are_not_outweighed_by_what_is_believed_of_machines(ratio):
     joint = 'shoulder_lift_joint'
     true = (effect('gear_ratio', joint=joint, scale=ratio),)
     problem, model = tiny(true, align=('base', 'tool'), count=13, turned=False)
-    bare, scale = robust_fit(problem, model, robust_scale(problem, problem.residuals(model)))
+    bare, scale = robust_fit(problem, model)
     start = bare.model.with_found((effect('gear_ratio', joint=joint, scale=0.0),))
     (found,) = fit(problem, start, scale).model.found
     assert float(found.scale) == pytest.approx(ratio, abs=3e-4)

@@ -15,7 +15,7 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Alternative
-from weld_twin_core.diagnosis.hypotheses.borne_out import borne_out
+from weld_twin_core.diagnosis.hypotheses.search import borne_out
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.twin.posterior import expected_poses

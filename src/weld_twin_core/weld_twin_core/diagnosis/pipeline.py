@@ -23,8 +23,7 @@ from .calibration.calibrated import stated
 from .evidence import LIKELIER, Row, Search, beyond_doubt
 from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
-from .hypotheses.borne_out import borne_out
-from .hypotheses.search import search
+from .hypotheses.search import borne_out, search
 from .hypotheses.selection import implausible
 from .levels.curved import choose_model, curved, locate_gap, no_noise
 from .levels.gathered import gathered

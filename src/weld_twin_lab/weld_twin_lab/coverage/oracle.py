@@ -61,7 +61,7 @@ def oracle_sigma(
     except TwinError:
         return {}
     problem, start = aligned([train], cell.robot, frozenset(cell.align), known)
-    found, scale = robust_fit(problem, start.with_found(causes), problem.unit_scale())
+    found, scale = robust_fit(problem, start.with_found(causes))
     own = replace(scale, position=cell.tracker.sigma)
     posterior = _posterior(problem, found, own, train)
     if not posterior.directions.count or other.measured is None:

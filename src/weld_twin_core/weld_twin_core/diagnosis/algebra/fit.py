@@ -375,14 +375,17 @@ def without_strays(scale: Scale) -> Scale:
 
 
 def robust_fit(
-    problem: Problem, model: Model, scale: Scale, precision: Array | None = None, rounds: int = 2
+    problem: Problem, model: Model, precision: Array | None = None, rounds: int = 2
 ) -> tuple[Fit, Scale]:
     """
     Return a fit and the noise and weights that go with it, by reweighting a few times.
 
+    The first weights are by what the model leaves as it is.
+
     precision: prior precision of the fit coordinates, shape (K,); left out, there is no prior.
     rounds: how often the weights are taken anew.
     """
+    scale = robust_scale(problem, problem.residuals(model))
     result = fit(problem, model, scale, precision)
     for _ in range(rounds):
         scale = robust_scale(problem, problem.residuals(result.model))

@@ -221,15 +221,14 @@ def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -
     problem, model = with_changes(
         result.problem, result.final.model, families, beliefs, result.precision
     )
-    scale = robust_scale(problem, problem.residuals(model))
-    final, scale = robust_fit(problem, model, scale, result.precision, rounds=1)
+    final, scale = robust_fit(problem, model, result.precision, rounds=1)
     result = replace(result, problem=problem, scale=scale, final=final)
     if [_site(change) for change in problem.changes] == before:
         return result
     work = replace(result.work, problem=replace(result.work.problem, changes=problem.changes))
     small = replace(result.small.model, changes=final.model.changes)
     start = replace(result.baseline.model, changes=final.model.changes)
-    bare, _ = robust_fit(problem, start, robust_scale(problem, problem.residuals(start)))
+    bare, _ = robust_fit(problem, start)
     small_fit = replace(result.small, model=small)
     return replace(result, work=work, small=small_fit, baseline=bare)
 

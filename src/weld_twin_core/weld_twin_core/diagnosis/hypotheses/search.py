@@ -1,19 +1,27 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From recordings to a fitted set of effects: baseline, selection, small errors, final fit."""
+"""
+From recordings to a fitted set of effects: baseline, selection, final fit; what held-out data choose.
+
+A joint that hardly moves shows its zero and its gear ratio alike, and the search takes one of the
+two. Where a held-out motion moves it, they part. Nothing is fitted to the held-out recordings; they
+choose among two or three, and only where these part plainly.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
-from ..algebra.problem import ROWS, Model, Problem, Scale
+from ..algebra.problem import ROWS, Model, Problem
+from ..algebra.seed_systems import Role
 from ..algebra.workspace import Workspace
 from ..beliefs import Beliefs
-from ..evidence import CandidateSet, Search
+from ..evidence import Alternative, CandidateSet, Search
 from ..result import Site
 from .alternatives import fit_alternatives, with_leads
 from .library import build
@@ -27,6 +35,8 @@ ROUNDS = 3
 SWAPS = 3
 """Times that an alternative that is clearly ahead may take an effect's place."""
 Progress = Callable[[str], None]
+LeftOn = Callable[[Search], float]
+"""What the final model of a search leaves on held-out recordings, RMS [m]."""
 
 
 def search(
@@ -39,7 +49,7 @@ def search(
     """
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
-    baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
+    baseline, scale = robust_fit(full, start)
     progress('baseline fitted')
     few = problem.thinned(ROWS)
     work, now, refused, crowded = _chosen(few, baseline.model, exclude, beliefs, progress)
@@ -49,12 +59,12 @@ def search(
         now, candidate_sets = settled(work, now, progress)
         candidate_sets, better = with_leads(work, now, candidate_sets)
         refused += better
-    final, scale = _fitted(full, now.model)
+    final, scale = robust_fit(full, now.model, rounds=1)
     if absurd := implausible(final.model):
         refused += absurd
         kept = [k for k, e in enumerate(final.model.found) if not beyond(final.model.robot, e)]
         candidate_sets = tuple(candidate_sets[k] for k in kept) if candidate_sets else ()
-        final, scale = _fitted(full, possible_part(final.model))
+        final, scale = robust_fit(full, possible_part(final.model), rounds=1)
     return Search(
         problem=full,
         scale=scale,
@@ -75,14 +85,9 @@ def refitted(result: Search, small: Fit) -> Search:
 
     small: the choice, fitted on the workspace's measurements.
     """
-    final, scale = _fitted(result.problem, small.model)
+    final, scale = robust_fit(result.problem, small.model, rounds=1)
     precision = effect_precision(final.model)
     return replace(result, small=small, final=final, scale=scale, precision=precision)
-
-
-def _fitted(full: Problem, model: Model) -> tuple[Fit, Scale]:
-    """Return the fit of a model that is nearly there, and its noise."""
-    return robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
 
 
 def _chosen(
@@ -157,3 +162,73 @@ def workspace(
     bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
     library = build(problem, now.model, scale, exclude)
     return Workspace(problem, scale, library, beliefs, bare), now
+
+
+def borne_out(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
+    """
+    Return the search with the effects and the alternatives that held-out recordings bear out.
+
+    An effect gives its place to its like where that alone carries over. Then those that leave more
+    than the effect in the model are no alternatives.
+
+    left_on: what held-out recordings say of a model.
+    """
+    # What no machine has is left out of the model and its candidate sets, not of their fits.
+    if len(result.candidate_sets) == len(result.small.model.found):
+        result = _exchanged(result, left_on, beliefs)
+    candidate_sets = list[CandidateSet]()
+    for effect, candidate_set in zip(
+        result.final.model.found, result.candidate_sets, strict=False
+    ):
+        own = Site.of(effect)
+        close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
+        certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure
+        if not certain and len(close) > 1:
+            remaining = _left(result, close, left_on)
+            by_site = dict(zip((r.site for r in close), remaining, strict=True))
+            candidate_set = _alike(candidate_set, own, by_site, beliefs)
+        candidate_sets.append(candidate_set)
+    return replace(result, candidate_sets=tuple(candidate_sets))
+
+
+def _exchanged(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
+    """Return the search with every effect replaced by its like where that alone carries over."""
+    for _ in result.candidate_sets:
+        # Those that could be in the model as well.
+        likes = [
+            one
+            for one in chain.from_iterable(result.candidate_sets)
+            if one.probability >= beliefs.listed
+            and one.fit is not result.small
+            and one.role is not Role.TAKEN_OUT
+        ]
+        remaining = _left(result, likes, left_on)
+        least = min(remaining, default=float('inf'))
+        if not likes or (1.0 + beliefs.parted) * least > left_on(result):
+            break
+        better = likes[remaining.index(least)]
+        tried = refitted(result, better.fit)
+        if implausible(tried.final.model):
+            break
+        case = result.work, better.fit
+        every = [fit_alternatives(*case, k) for k in range(len(better.fit.model.found))]
+        candidate_sets, refused = with_leads(*case, every)
+        result = replace(tried, candidate_sets=candidate_sets, refused=(*tried.refused, *refused))
+    return result
+
+
+def _left(result: Search, some: Sequence[Alternative], left_on: LeftOn) -> list[float]:
+    """Return what each alternative leaves on held-out recordings, RMS [m]."""
+    return [left_on(replace(result, final=one.fit)) for one in some]
+
+
+def _alike(
+    candidate_set: CandidateSet, own: Site, remaining: dict[Site, float], beliefs: Beliefs
+) -> CandidateSet:
+    """Return a candidate set without the alternatives that leave more than the effect in the model."""
+    most = (1.0 + beliefs.parted) * min(remaining.values())
+    if remaining.get(own, most) > most:
+        return candidate_set
+    kept = [one for one in candidate_set if remaining.get(one.site, most) <= most]
+    whole = sum(one.probability for one in kept)
+    return tuple(replace(one, probability=one.probability / whole) for one in kept)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.fit import fit, robust_fit, robust_scale
+from ..algebra.fit import fit, robust_fit
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Left, Scatter, Search, Verdict
 from ..result import NAMING, Shrink, Site, Structure
@@ -70,8 +70,7 @@ def _beside(
 ) -> Curved | None:
     small = result.problem.thinned(ROWS)
     start = result.baseline.model.with_found(tuple(kept))
-    noise = robust_scale(small, small.residuals(start))
-    bare, scale = robust_fit(small, start, noise, rounds=1)
+    bare, scale = robust_fit(small, start, rounds=1)
     form = free_form(small, scale, bare, beliefs, wandering=wandering)
     if not form.parts:
         return None
@@ -79,8 +78,8 @@ def _beside(
     own = bare.coordinates.size
     precision = np.concatenate([np.zeros(own), form.precision])
     full = result.problem
-    scale = robust_scale(full, full.residuals(fit(small, model, scale, precision, 4).model))
-    final, scale = robust_fit(full, model, scale, precision, rounds=1)
+    nearly = fit(small, model, scale, precision, 4).model
+    final, scale = robust_fit(full, nearly, precision, rounds=1)
     changed = replace(result, final=final, scale=scale, precision=precision, dense=False)
     if any(part.any() for part in result.scale.left_out):
         changed = changed.apart_from_strays()

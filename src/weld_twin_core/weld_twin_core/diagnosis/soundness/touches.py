@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...contacts import Artefact, Contact, Contacts
 from ...recording import Recording
-from ..algebra.fit import robust_fit, robust_scale
+from ..algebra.fit import robust_fit
 from ..algebra.independent_rows import robust_spread
 from ..algebra.places import FEWEST
 from ..algebra.problem import Model, Problem
@@ -81,8 +81,7 @@ def _plain_fit(problem: Problem, model: Model) -> Model:
     view = problem.features(model)[0].view
     every = plain_causes(model.robot, view, ('constant', 'load'))
     start = model.with_found((*model.found, *every))
-    scale = robust_scale(problem, problem.residuals(model))
-    return robust_fit(problem, start, scale)[0].model
+    return robust_fit(problem, start)[0].model
 
 
 def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from diagnosis_cells import effect
 from scipy.stats import norm
 
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
-from weld_twin_core.diagnosis.algebra.seed_systems import SeedSystems, Unit, evidence, ranking
+from weld_twin_core.diagnosis.algebra.workspace import SeedSystems, Unit, evidence, ranking
 from weld_twin_core.diagnosis.result import Site
 
 

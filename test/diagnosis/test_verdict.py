@@ -10,7 +10,7 @@ from diagnosis_cells import effect, known_scale, tiny
 
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
-from weld_twin_core.diagnosis.algebra.seed_systems import Role
+from weld_twin_core.diagnosis.algebra.workspace import Role
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen

@@ -14,8 +14,8 @@ from weld_twin_core.diagnosis.advice.next_touches import (
     next_touches,
     scatter,
 )
+from weld_twin_core.diagnosis.algebra.motions import plain_causes
 from weld_twin_core.diagnosis.algebra.problem import Scale
-from weld_twin_core.diagnosis.algebra.still_joints import plain_causes
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.motion.inverse.newton import reaching
 

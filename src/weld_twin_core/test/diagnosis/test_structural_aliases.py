@@ -9,7 +9,7 @@ import pytest
 from small_arm import small_arm
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.algebra.any_motion import same_error
+from weld_twin_core.diagnosis.algebra.motions import same_error
 from weld_twin_core.effects import effect_from_mapping
 
 NOISE = 2e-5

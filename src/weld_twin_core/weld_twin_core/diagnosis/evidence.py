@@ -25,8 +25,7 @@ from .algebra.definite import ROUNDING
 from .algebra.fit import Fit, without_strays
 from .algebra.noise_floor import NANOMETRE
 from .algebra.problem import Problem, Scale, Site
-from .algebra.seed_systems import Role
-from .algebra.workspace import Library, Workspace
+from .algebra.workspace import Library, Role, Workspace
 from .beliefs import Beliefs
 from .result import Family, Structure
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.algebra.any_motion import same_error
+from weld_twin_core.diagnosis.algebra.motions import same_error
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.registry import REGISTRY
 

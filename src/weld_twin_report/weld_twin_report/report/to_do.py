@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from weld_twin_core.diagnosis.advice import actions
-from weld_twin_core.diagnosis.algebra.still_joints import REASON
+from weld_twin_core.diagnosis.algebra.motions import REASON
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY

@@ -32,8 +32,8 @@ from ...sequences import halton
 from ...twin.features import Features
 from ..algebra.definite import FLAT
 from ..algebra.fit import effect_precision, frame_prior
+from ..algebra.motions import plain_causes
 from ..algebra.problem import PLACES, Model, Problem, Scale
-from ..algebra.still_joints import plain_causes
 from .experiment import motion_entry
 from .postures import widened
 

@@ -29,6 +29,8 @@ Rows = slice | Index
 MANY = 32
 """Coordinates of one effect in a model from which on they are kept as amounts: products of fewer are
 as quick written out."""
+SHOWN = 1e-2
+"""A coordinate a thousand times its typical size must move some row by this much noise to be seen."""
 BLOCKS = 24
 """Folds whose scores are kept apart: enough to estimate a variance to a third."""
 

@@ -16,8 +16,8 @@ from ...twin.memory import Picker
 from .columns import Maker, Piece, Rows, rows_of
 from .definite import EMPTY, FLAT, ROUNDING, outside, span_of
 from .fit import design
+from .motions import moved_most
 from .problem import Model, Problem, Scale
-from .still_joints import moved_most
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
 USUAL = 0.8

@@ -10,8 +10,8 @@ from ...arrays import Array
 from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
 from ..algebra.definite import outside, span_of
+from ..algebra.motions import plain_causes
 from ..algebra.problem import Model, Problem
-from ..algebra.still_joints import plain_causes
 from ..evidence import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
-from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed
+from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance, designed
 from ..algebra.definite import EMPTY
 from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
@@ -38,8 +38,6 @@ from ..unseen.unseen_stretches import Unseen
 
 _LEAST_SHARE = 1e-3
 """Share of the rows that counts as independent at the least; keeps a division finite."""
-_UNSEEN = 1e-2
-"""A coordinate a thousand times its typical size must move some row by this much noise."""
 
 
 def named_effects(
@@ -160,7 +158,7 @@ def _visible(columns: Columns, model: Model) -> NDArray[np.bool_]:
     """Return which columns the data show, shape (P,)."""
     scales = np.concatenate([effect.fit.coordinate_scales() for effect in model.found])
     reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
-    return np.asarray(columns.peaks() * reach > _UNSEEN)
+    return np.asarray(columns.peaks() * reach > SHOWN)
 
 
 def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: float) -> Array:

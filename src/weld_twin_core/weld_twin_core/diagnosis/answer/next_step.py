@@ -21,8 +21,8 @@ from ..advice.postures import Limits, Room
 from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
+from ..algebra.motions import narrow
 from ..algebra.problem import Scale
-from ..algebra.still_joints import narrow
 from ..evidence import LIKELIER, Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part

@@ -26,14 +26,10 @@ from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.places import by_place, posed
 from ..algebra.problem import Model, Problem, frames_named, usable
-from .alignment import initial_frames
+from .alignment import FLOOR, NEAR, initial_frames
 
-NEAR = 0.02
-"""Median distance [m] of the tool point from its contacts from which a fit finds its own way."""
 ROUNDS = 20
 """Times that the tool vector is found anew with less weight for what is off; it settles sooner."""
-FLOOR = 1e-5
-"""Distance [m] below which a contact gains no more weight."""
 NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperature')
 """What effects may depend on that no contact tells of."""
 NOT_TOLD = 'contacts do not tell of it'

@@ -30,10 +30,10 @@ import numpy as np
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
 from ..algebra.definite import ROUNDING
-from ..algebra.fit import fit, robust_scale
+from ..algebra.fit import FRAME_SHIFT, fit, robust_scale
 from ..algebra.problem import Model, Problem
 
-NEAR = 0.02
+NEAR = FRAME_SHIFT
 """Median gap [m] from which a least-squares fit finds its own way."""
 MOST_ROWS = 3000
 """Rows that the frames are found on: far more than their numbers need, few enough to be quick."""

@@ -23,7 +23,6 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
-from ..algebra.any_motion import constant, of_no_size
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
 from ..algebra.definite import REPEATED, unit_diagonal
 from ..algebra.fit import (
@@ -38,6 +37,7 @@ from ..algebra.fit import (
     with_weights,
 )
 from ..algebra.independent_rows import effective_share
+from ..algebra.motions import constant, of_no_size
 from ..algebra.problem import ROWS, Change, Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..evidence import Search

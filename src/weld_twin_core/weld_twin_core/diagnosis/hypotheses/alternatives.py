@@ -21,10 +21,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.any_motion import constant, of_no_size, same_error
 from ..algebra.fit import Fit
-from ..algebra.seed_systems import Choice, Part, Role, evidence
-from ..algebra.workspace import Workspace
+from ..algebra.motions import constant, of_no_size, same_error
+from ..algebra.workspace import Choice, Part, Role, Workspace, evidence
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
 from .other_sets import Other

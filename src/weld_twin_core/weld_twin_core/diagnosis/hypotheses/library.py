@@ -10,18 +10,17 @@ import numpy as np
 
 from ...effects.effect import Effect, Stage
 from ...twin.features import joints_of
-from ..algebra.any_motion import set_instead
-from ..algebra.columns import Columns, Maker, Piece
-from ..algebra.problem import Model, Problem, Scale
-from ..algebra.seed_systems import Role, SeedSystems, Unit
-from ..algebra.still_joints import (
+from ..algebra.columns import SHOWN, Columns, Maker, Piece
+from ..algebra.motions import (
     REASON,
     candidate_kinds,
     hardly_moves,
     moved_most,
     separable_orders,
+    set_instead,
 )
-from ..algebra.workspace import Library
+from ..algebra.problem import Model, Problem, Scale
+from ..algebra.workspace import Library, Role, SeedSystems, Unit
 from ..result import Site
 
 EXCLUDED = 'excluded by the user'
@@ -138,4 +137,4 @@ def _shown(seed: Effect, piece: Piece) -> bool:
     """Return whether the data show a seed: even a thousand times the typical effect may be no noise."""
     scales = seed.fit.coordinate_scales()
     reach = 1e3 * float(scales.max()) if scales.size else 1.0
-    return bool(piece.peaks().max(initial=0.0) * reach > 1e-2)
+    return bool(piece.peaks().max(initial=0.0) * reach > SHOWN)

@@ -23,8 +23,17 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.definite import REPEATED, outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
-from ..algebra.seed_systems import Choice, Part, SeedSystems, evidence, parts, ranking
-from ..algebra.workspace import Library, Workspace, merged
+from ..algebra.workspace import (
+    Choice,
+    Library,
+    Part,
+    SeedSystems,
+    Workspace,
+    evidence,
+    merged,
+    parts,
+    ranking,
+)
 from ..result import Site
 from .selection import backward, implausible, sites
 

@@ -18,8 +18,7 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
 from ..algebra.problem import ROWS, Model, Problem
-from ..algebra.seed_systems import Role
-from ..algebra.workspace import Workspace
+from ..algebra.workspace import Role, Workspace
 from ..beliefs import Beliefs
 from ..evidence import Alternative, CandidateSet, Search
 from ..result import Site

@@ -14,8 +14,7 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit
 from ..algebra.problem import Model
-from ..algebra.seed_systems import Choice, evidence
-from ..algebra.workspace import Workspace
+from ..algebra.workspace import Choice, Workspace, evidence
 from ..result import Site
 
 SHORTLIST = 4

@@ -37,8 +37,8 @@ from ..algebra.fit import (
     stepped,
 )
 from ..algebra.learned_sizes import learned_precision, projected
+from ..algebra.motions import candidate_kinds, hardly_moves, moved_most, separable_orders
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import candidate_kinds, hardly_moves, moved_most, separable_orders
 from ..beliefs import Beliefs
 from ..unseen.unseen_stretches import Unseen
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.any_motion import same_error
+from ..algebra.motions import same_error
 from ..algebra.noise_floor import NANOMETRE
 from ..beliefs import Beliefs
 from ..evidence import Search

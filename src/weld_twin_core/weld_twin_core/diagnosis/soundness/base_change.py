@@ -25,8 +25,8 @@ from ...twin.features import Features
 from ..algebra.definite import outside, span_of
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
+from ..algebra.motions import moved_most, plain_causes
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.still_joints import moved_most, plain_causes
 from .lag import KEPT
 from .limits import FEW, TINY, WIDER
 

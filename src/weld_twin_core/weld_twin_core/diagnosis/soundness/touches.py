@@ -23,9 +23,9 @@ from ...contacts import Artefact, Contact, Contacts
 from ...recording import Recording
 from ..algebra.fit import robust_fit
 from ..algebra.independent_rows import robust_spread
+from ..algebra.motions import plain_causes
 from ..algebra.places import FEWEST
 from ..algebra.problem import Model, Problem
-from ..algebra.still_joints import plain_causes
 from ..frames.aligned import aligned
 from ..result import Unsound
 from .evidence import Finding, mistake

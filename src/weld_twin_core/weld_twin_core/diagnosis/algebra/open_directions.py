@@ -30,6 +30,7 @@ WORSE = 4.0
 """Chi-square per direction that the given frames may cost: two standard deviations."""
 ROUNDS = 3
 """Gauss-Newton steps by which the rest follows; it starts next to where it ends."""
+AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 ROWS = 3000
 """Rows from which directions are taken."""
 
@@ -146,3 +147,11 @@ def _closed_step(
     pull[closed.shape[1] :] = ridge[closed.shape[1] :] * x
     step = solve_scaled(mixed @ mixed.T + np.diag(ridge), mixed @ residual - pull, 0.0)
     return np.concatenate([closed @ step[: closed.shape[1]], step[closed.shape[1] :]])
+
+
+def in_words(name: str) -> str:
+    """Return the name of a direction of a frame, as `shown` has it, as people read it."""
+    frame, axis = name.split('.')
+    kind, _, number = frame.partition(' ')
+    which = '' if number in ('', '0') else f' of recording {int(number) + 1}'
+    return f'{kind} {AXES[int(axis)]}{which}'

@@ -28,7 +28,7 @@ from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
-from ..algebra.open_directions import VISIBLE, open_directions
+from ..algebra.open_directions import AXES, VISIBLE, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..result import Shrink
 from ..unseen.folds import posture_regions
@@ -47,7 +47,6 @@ PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 MOST = 3
 """Axes that name a direction."""
-AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 
 
 def allowed(
@@ -314,12 +313,5 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     for vector in result.vectors.T:
         share = np.abs(vector / size)
         order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]
-        out.append(' with '.join(_named(result.names[i]) for i in order[:MOST]))
+        out.append(' with '.join(in_words(result.names[i]) for i in order[:MOST]))
     return tuple(out)
-
-
-def _named(name: str) -> str:
-    frame, axis = name.split('.')
-    kind, _, number = frame.partition(' ')
-    which = '' if number in ('', '0') else f' of recording {int(number) + 1}'
-    return f'{kind} {AXES[int(axis)]}{which}'

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...arrays import Array
 from ...errors import DataError
 from ...recording import Recording
-from ..algebra.open_directions import shown
+from ..algebra.open_directions import in_words, shown
 from .evidence import Case, Finding, note, warning
 from .lengths import length, listed
 from .limits import ENOUGH, FEW, MOVED, NOISE, RUN, STRAY, TINY
@@ -25,7 +25,6 @@ from .limits import ENOUGH, FEW, MOVED, NOISE, RUN, STRAY, TINY
 TWO_ARMS = 12
 """Turning joints from which a chain holds two arms: of six each. An arm on a gantry that welds on a
 positioner has nine, or ten with seven axes."""
-AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 
 
 def motion(case: Case) -> Sequence[Finding]:
@@ -86,16 +85,11 @@ def _frames(case: Case) -> Iterator[Finding]:
     hidden = int((strength < 1.0).sum())
     if hidden:
         strongest = np.argsort(-np.abs(vectors[:, 0]))[:2]
-        pair = listed([_named(names[i]) for i in sorted(strongest)])
+        pair = listed([in_words(names[i]) for i in sorted(strongest)])
         yield note(
             f'The motion leaves {hidden} of {len(names)} directions of the aligned frames open '
             f'(first of all {pair}); turn the tool more, about more axes, or align less.'
         )
-
-
-def _named(name: str) -> str:
-    frame, axis = name.split('.')
-    return f'{frame.split()[0]} {AXES[int(axis)]}'
 
 
 def quantity(case: Case) -> Sequence[Finding]:

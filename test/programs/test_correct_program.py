@@ -327,6 +327,20 @@ def test_a_point_that_the_program_changes_itself_is_left(tmp_path):
     assert 'P is used at seam.script line 4' in said.out
 
 
+def test_a_point_of_a_seam_that_is_left_is_not_moved_for_another(tmp_path):
+    # The first seam runs with a tool that nobody knows, and shares a point with the second.
+    rows = SEAM.splitlines()
+    named = rows[2].replace('movel(p', 'P = p').replace(', v=0.1)', '')
+    shared = rows[1], '  movel(P, v=0.1)', rows[3]
+    known = '  set_tcp(p[0, 0, 0, 0, 0, 0])'
+    lines = [rows[0], named, '  set_tcp(Torch)', *shared, known, *shared, *rows[1:], '']
+    said = corrected(tmp_path, '\n'.join(lines))
+    assert said.code == 0, said.err
+    assert 'belongs to one that is left' in said.out and 'tool Torch' in said.out
+    out = (tmp_path / 'out' / 'seam.script').read_text().splitlines()
+    assert out[:10] == lines[:10] and out[10:13] != lines[10:13]
+
+
 def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
     (tmp_path / 'seam.script').write_text(SEAM)
     content = {'schema': 'weld_twin/diagnosis/1', 'model': {'robot': 'ur10', 'kinematics': 'x'}}

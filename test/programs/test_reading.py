@@ -130,7 +130,32 @@ def test_a_spline_move_of_kuka_brings_its_own_tool_base_and_speed():
     text = 'DEF a()\n' + point + data + move + 'SLIN XP1 WITH $TOOL={X 1}\nEND\n'
     step, other = read('krl', (text,), 'kuka_kr16_2').steps
     assert (step.tool.name, step.base.name, step.speed, step.stop) == ('4', '2', 0.25, False)
-    assert other.end is None and 'tool or base' in other.why
+    assert 'tool or base' in other.tool.why
+
+
+def test_the_moves_of_a_spline_have_its_tool_and_base_where_they_bring_none():
+    point = 'DECL E6POS XP1={X 1,Y 2,Z 3,A 0,B 0,C 0}\n'
+    data = 'DECL FDAT FP{0}={{TOOL_NO {0},BASE_NO {0},IPO_FRAME #BASE}}\n'
+    own = ' WITH $TOOL=STOOL2(FP{0}), $BASE=SBASE(FP{0}.BASE_NO)\n'
+    block = f'SPLINE{own.format(4)}SLIN XP1\nSLIN XP1{own.format(5)}ENDSPLINE\nSLIN XP1\n'
+    text = 'DEF a()\n' + point + data.format(4) + data.format(5) + KRL_LONG + block + 'END\n'
+    steps = read('krl', (text,), 'kuka_kr16_2').steps
+    assert [step.tool.name for step in steps[:2]] == [step.base.name for step in steps[:2]]
+    assert [step.tool.name for step in steps[:2]] == ['4', '5']
+    assert steps[2].tool.value[2, 3] == 0.25
+
+
+def test_an_abb_move_that_switches_an_output_has_its_tool_before_it():
+    point = '[[900,0,800],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
+    frame = 'PERS wobjdata w:=[FALSE,TRUE,"",[[500,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+    moves = (
+        f'MoveLDO {point}, v9, fine, tool0\\WObj:=w, doArc, 1;\n'
+        f'MoveCSync {point}, {point}, v9, z1, tool0\\WObj:=w, "stir";\n'
+    )
+    text = f'MODULE m\n{frame}PROC main()\n{moves}ENDPROC\nENDMODULE\n'
+    steps = read('rapid', (text,), 'abb_irb1600').steps
+    assert [step.stop for step in steps] == [True, False]
+    assert all(step.base.value[0, 3] == 0.5 and step.tool.value is not None for step in steps)
 
 
 @pytest.mark.parametrize(
@@ -295,6 +320,7 @@ UR_LONG, UR_SHORT = UR_TOOL.format(0.25), UR_TOOL.format(0.09)
         ('krl', ['WHILE x', KRL_SHORT, KRL_SEAM, 'ENDWHILE', KRL_SEAM], [True, False]),
         ('krl', ['IF x THEN', '$IPO_MODE = #TCP', 'ENDIF', KRL_SEAM], [False]),
         ('krl', ['IF x THEN', '$BASE.X = 5', 'ENDIF', KRL_SEAM], [False]),
+        ('krl', ['LOOP', KRL_SEAM, '$IPO_MODE = #TCP', 'ENDLOOP'], [False]),
         ('urscript', ['if (x):', UR_SHORT, 'end', UR_SEAM], [False]),
         ('urscript', ['if (x):', UR_SHORT, 'else:', UR_SHORT, 'end', UR_SEAM], [True]),
         (
@@ -370,6 +396,77 @@ def test_what_a_routine_sets_holds_after_its_call(language, text, reason):
     assert (move.kind == 'unknown') == bool(reason) and reason in move.why
 
 
+ABB_MOVE, ABB_ON, ABB_OFF = 'MoveL p1,v100,fine,tool0;', 'PDispSet x;', 'PDispOff;'
+TP_MOVE, TP_ON, TP_OFF = 'L P[1] 9mm/sec FINE', 'Touch Offset PR[1]', 'Touch Offset End'
+JOB_MOVE, JOB_ON, JOB_OFF = 'MOVL C00001 V=9.0', 'SFTON P001', 'SFTOF'
+JOB_HEAD = (
+    '/JOB\n//NAME A\n//POS\n///TOOL 1\n///POSTYPE ROBOT\nC00001=900,0,300,180,0,0\n//INST\nNOP\n'
+)
+TP_TAIL = (
+    '/POS\nP[1]{\n GP1:\n UF : 0, UT : 1,\n X = 900 mm, Y = 0 mm, Z = 300 mm,\n W = 180 deg, '
+    'P = 0 deg, R = 0 deg\n};\n/END\n'
+)
+
+
+@pytest.mark.parametrize(
+    ('language', 'lines', 'known'),
+    [
+        ('rapid', [ABB_ON, 'IF a THEN', ABB_OFF, 'ENDIF', ABB_MOVE], [False]),
+        ('rapid', [ABB_ON, f'IF a {ABB_OFF}', ABB_MOVE], [False]),
+        ('rapid', [ABB_ON, 'IF a THEN', ABB_OFF, 'ELSE', ABB_OFF, 'ENDIF', ABB_MOVE], [True]),
+        ('rapid', ['TEST n', 'CASE 1:', ABB_ON, 'DEFAULT:', 'ENDTEST', ABB_MOVE], [False]),
+        ('rapid', ['WHILE a DO', ABB_MOVE, ABB_ON, 'ENDWHILE', ABB_OFF, ABB_MOVE], [False, True]),
+        ('rapid', ['FOR i FROM 1 TO 3 DO', ABB_ON, ABB_OFF, ABB_MOVE, 'ENDFOR'], [True]),
+        ('rapid', ['up:', ABB_MOVE, ABB_ON, 'GOTO up;'], [False]),
+        ('rapid', ['up:', ABB_MOVE, 'GOTO up;'], [True]),
+        ('rapid', ['sub;', ABB_ON, 'IF a sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE], [False]),
+        ('rapid', [ABB_ON, ABB_OFF, 'sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE], [True]),
+        (
+            'rapid',
+            [ABB_ON, 'a;', 'ENDPROC', 'PROC a()', 'sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE],
+            [False],
+        ),
+        ('fanuc-ls', [TP_ON, 'IF (DI[1]=ON) THEN', TP_OFF, 'ENDIF', TP_MOVE], [False]),
+        ('fanuc-ls', [TP_ON, 'IF DI[1]=ON,JMP LBL[1]', TP_OFF, 'LBL[1]', TP_MOVE], [False]),
+        ('fanuc-ls', [TP_ON, TP_OFF, TP_MOVE], [True]),
+        ('fanuc-ls', ['LBL[1:up]', TP_MOVE], [True]),
+        ('inform', [JOB_ON, 'IFTHENEXP I001=1', JOB_OFF, 'ENDIF', JOB_MOVE], [False]),
+        ('inform', [JOB_ON, 'JUMP *A IF IN#(1)=ON', JOB_OFF, '*A', JOB_MOVE], [False]),
+        ('inform', [JOB_ON, JOB_OFF, JOB_MOVE], [True]),
+        ('inform', ['*A', JOB_MOVE], [True]),
+    ],
+)
+def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines, known):
+    head, form, tail = {
+        'rapid': (RAPID_SEAM.partition('sub;')[0], '{}\n', 'ENDPROC\nENDMODULE\n'),
+        'fanuc-ls': ('/PROG A\n/MN\n', '   1:{} ;\n', TP_TAIL),
+        'inform': (JOB_HEAD, '{}\n', 'END\n'),
+    }[language]
+    text = head + ''.join(form.format(line) for line in lines) + tail
+    steps = read(language, (text,), PROGRAMS[language][0]).steps
+    assert [not step.shift.why for step in steps] == known
+
+
+@pytest.mark.parametrize(
+    ('language', 'text'),
+    [
+        (
+            'rapid',
+            RAPID_SEAM.partition('PROC')[0]
+            + 'PERS tooldata t:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n'
+            'PROC weld(PERS tooldata t)\nMoveL p1,v9,fine,t;\nENDPROC\nENDMODULE\n',
+        ),
+        ('krl', f'DEF a(F:IN)\nFRAME F={FRAME}\n{KRL_LONG}$BASE = F\n{KRL_SEAM}END\n'),
+        ('urscript', f'T = p[0,0,0.1,0,0,0]\ndef sub(T):\nset_tcp(T)\n{UR_SEAM}end\n'),
+    ],
+)
+def test_what_a_routine_is_handed_is_not_the_frame_of_that_name(language, text):
+    robot = PROGRAMS[language][0]
+    own = context(robot, language).controller
+    ((move,),) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
+    assert move.kind == 'unknown'
+
+
 def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     source = (MADE / 'bracket.mod').read_text().replace('[TRUE, [[0,0,250]', '[FALSE, [[0,0,250]')
     robot = wt.load('abb_irb1600')
@@ -401,9 +498,10 @@ def test_moves_of_another_kind_end_what_is_known(language, line):
     text = source.replace(start, line + start, 1)
     assert text != source
     before, after = (read(language, (each, *beside), robot).steps for each in (source, text))
-    assert [step.end for step in after].count(None) == [step.end for step in before].count(
-        None
-    ) + 1
+    unknown = [
+        sum(step.end is None or step.shift.why != '' for step in each) for each in (before, after)
+    ]
+    assert unknown[1] == unknown[0] + 1
 
 
 def test_instructions_that_move_nothing_end_nothing():
@@ -485,7 +583,7 @@ def test_abb_targets_under_a_displacement_are_not_touched():
         'ENDPROC\nENDMODULE\n'
     )
     displaced, plain = read('rapid', (text,), 'abb_irb1600').steps
-    assert 'displaces' in displaced.why and plain.end is not None
+    assert 'displaces' in displaced.shift.why and not plain.shift.why
 
 
 @pytest.mark.parametrize(

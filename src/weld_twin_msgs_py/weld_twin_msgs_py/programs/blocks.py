@@ -5,17 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from .build import Program, Step
+from .build import Program, Step, exchange
 from .controllers import Frame
 
 Unclear = Callable[[str], Frame]
 """Makes the frame of a place that several ways lead to; takes where they part."""
 Frames = tuple[Frame, ...]
-_CASES = ('switch',)
+_CASES = ('switch', 'test')
 """Words that begin branches of which the first has a word of its own."""
 _PARTED = ('if', *_CASES)
 """Words that begin branches; all others begin loops."""
@@ -45,11 +45,31 @@ class Blocks:
     Follows frames through branches and loops.
 
     A frame that not every way sets alike is unclear after them, and in a loop until it is set.
+
+    unclear: by the field of a move that holds a frame, in the order in which they are handed over.
     """
 
-    def __init__(self, program: Program, unclear: Sequence[Unclear]) -> None:
+    def __init__(self, program: Program, **unclear: Unclear) -> None:
         self._program, self._unclear = program, unclear
         self._open: list[_Block] = []
+
+    def follow(self, where: str, words: Sequence[str | None], now: Frames) -> Frames:
+        """
+        Return what holds after a word.
+
+        words: that begins a block, or a branch, or ends a block; None for all but one, or for all
+        where a loop is left.
+        """
+        begun, parted, ended = words
+        if begun:
+            self.begin(where, begun, now)
+        elif parted:
+            return self.branch(parted, now)
+        elif ended:
+            return self.end(now)
+        else:
+            self.leave(now)
+        return now
 
     def begin(self, where: str, word: str, now: Frames) -> None:
         """Begin the block of a word, where frames hold now."""
@@ -78,27 +98,26 @@ class Blocks:
         block = self._open.pop()
         ways = [*block.ends, now] if block.word in _REST else [block.head, *block.ends, now]
         after = []
-        for k, unclear in enumerate(self._unclear):
+        for k, (name, unclear) in enumerate(self._unclear.items()):
             alike = all(_same(way[k], ways[0][k]) for way in ways)
             after.append(ways[0][k] if alike else unclear(block.where))
             if block.loop and not alike:
-                self._replace(block, block.head[k], after[k])
+                # Moves of its first round have what a later round finds otherwise.
+                exchange(block.moves, name, block.head[k], after[k], block.first)
         return tuple(after)
-
-    @staticmethod
-    def _replace(block: _Block, held: Frame, unclear: Frame) -> None:
-        """Let moves of a loop's first round know that a later round finds another frame."""
-        for k, step in enumerate(block.moves[block.first :], block.first):
-            if step.tool is held:
-                block.moves[k] = replace(step, tool=unclear)
-            elif step.base is held:
-                block.moves[k] = replace(step, base=unclear)
 
 
 def unclear(what: str) -> Unclear:
     """Return what makes a frame that is named by what sets it."""
     return lambda where: Frame(
         what, why=f'the numbers of {what} hang on which way the program takes at {where}'
+    )
+
+
+def unclear_shift(where: str) -> Frame:
+    """Return the shift of a place that is displaced on some of its ways."""
+    return Frame(
+        '', why=f'whether it is displaced hangs on which way the program takes at {where}'
     )
 
 

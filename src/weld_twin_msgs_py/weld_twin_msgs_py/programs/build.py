@@ -62,7 +62,8 @@ class Step:
     """
     One move as a program says it; without an end it is not understood, ``why`` says why.
 
-    ``along`` is False where the program says that a straight way is not one on the workpiece.
+    ``along`` is False where the program says that a straight way is not one on the workpiece. What
+    ``shift`` says why is that it goes elsewhere than its point says.
     """
 
     kind: Kind
@@ -79,6 +80,7 @@ class Step:
     astray: Astray | None = None
     why: str = ''
     along: bool = True
+    shift: Frame = field(default_factory=lambda: Frame(''))
 
 
 @dataclass(eq=False)
@@ -151,6 +153,13 @@ class Program:
         return [step for piece in self.pieces for step in piece]
 
 
+def exchange(moves: list[Step], name: str, held: Frame, other: Frame, first: int = 0) -> None:
+    """Give moves from one on, that hold a frame in a field of a name, another one there."""
+    for k, step in enumerate(moves[first:], first):
+        if getattr(step, name) is held:
+            moves[k] = replace(step, **{name: other})
+
+
 def hold_if_used_elsewhere(
     program: Program, names: dict[str, int], texts: Sequence[str], used: Sequence[set[int]]
 ) -> None:
@@ -207,12 +216,17 @@ def _move(
     step: Step, seam: int, arm: CarriedArm, controller: Controller, points: Sequence[Point]
 ) -> Move:
     try:
-        if step.end is None:
-            raise DataError(step.why)
+        if step.end is None or step.shift.why:
+            raise DataError(step.why or step.shift.why)
         tool = controller.tool(step.tool)
         base, along = _base(step, points[step.end.point], arm, controller)
     except DataError as error:
-        return Move('unknown', None, np.eye(4), where=step.where, seam=seam, why=str(error))
+        # Its points stay as they are, wherever else they are used: else it would not be left.
+        end, via = (
+            None if ref is None else Use(ref.point, np.eye(4), np.eye(4), False)
+            for ref in (step.end, step.via)
+        )
+        return Move('unknown', end, np.eye(4), via, where=step.where, seam=seam, why=str(error))
     return Move(
         step.kind,
         _use(step.end, base),

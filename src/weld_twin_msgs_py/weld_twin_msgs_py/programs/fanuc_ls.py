@@ -23,6 +23,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
+from .blocks import Blocks, unclear_shift
 from .build import Program, Ref, Step, half_turns_kept
 from .context import Context
 from .controllers import Frame
@@ -42,6 +43,8 @@ _SHIFTING = re.compile(
 )
 """What lets a move go elsewhere; RTCP is a tool that stands still."""
 _DISPLACING = re.compile(r'Touch Offset (End\b)?', re.I)
+_BLOCK = re.compile(r'(?:(IF(?=\b.*\bTHEN\Z)|FOR)\b|(ELSE)\Z|(END(?:IF|FOR))\Z|(LBL)\[)', re.S)
+"""Where the program branches or goes round, another branch, where they come together; a label."""
 _FRAME_SET = re.compile(r':[ \t]*(UFRAME|UTOOL)\[\s*(\d*)(?!\d)[^=\r\n]*=')
 _SPEED = re.compile(r'([\d.]+)[ \t]*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)')
 _UNITS = {'mm/sec': 1e-3, 'cm/min': 0.01 / 60.0, 'inch/min': 0.0254 / 60.0}
@@ -59,7 +62,7 @@ class FanucReader(Reader):
         self.points: dict[int, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.untaught: dict[int, str] = {}
-        self.displaced = ''
+        self.blocks = Blocks(self.program, shift=unclear_shift)
 
     def read(self) -> Program:
         parts = {result[1]: result.start() for result in _PART.finditer(self.text)}
@@ -162,7 +165,12 @@ class FanucReader(Reader):
             self.program.dwell(max(float(wait[1]), 0.0))
         offset = _DISPLACING.match(text)
         if offset is not None:
-            self.displaced = '' if offset[1] else f'Touch Offset at {where}'
+            self.shift = Frame('', why='' if offset[1] else f'Touch Offset at {where} shifts it')
+        block = _BLOCK.match(text)
+        if block is not None and block[4] and _DISPLACING.search(self.text):
+            self.shift = unclear_shift(where)
+        elif block is not None and not block[4]:
+            (self.shift,) = self.blocks.follow(where, block.groups()[:3], (self.shift,))
         move = _MOVE.match(text)
         self._hold_used(text, where, move is not None)
         if move is None:
@@ -177,12 +185,12 @@ class FanucReader(Reader):
             name, index, tail = end[1], end[2], end[3]
         point = self._index(name, index)
         found = _SHIFTING.search(tail)
-        shift = self.displaced if found is None else found[0]
-        lost = point is None or (kind == 'circular' and via is None) or move[1] not in _KINDS
-        if lost or shift:
-            self.program.unknown(kind, where, self._why(name, index, shift))
+        if point is None or (kind == 'circular' and via is None):
+            self.program.unknown(kind, where, self._why(name, index))
             return
-        self._add(kind, where, via, point, tail)
+        why = f'{found[0]} shifts it' if found else ''
+        why = why or (f'{move[1]} is not understood' if move[1] not in _KINDS else '')
+        self._add(kind, where, via, point, tail, Frame('', why=why) if why else self.shift)
 
     def _hold_used(self, text: str, where: str, moves: bool) -> None:
         if re.search(r'(?<![A-Z])P\[\s*(?:A?R)\[', text):
@@ -194,8 +202,9 @@ class FanucReader(Reader):
                 if point >= 0:
                     self.program.hold(point, f'P[{result[1]}] is used at {where} by no move')
 
-    def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
-        assert point is not None
+    def _add(
+        self, kind: Kind, where: str, via: int | None, point: int, tail: str, shift: Frame
+    ) -> None:
         tool, base = self.frames[point]
         step = Step(
             kind,
@@ -208,6 +217,7 @@ class FanucReader(Reader):
             re.search(r'\bFINE\b', tail) is not None,
             along=re.search(r'\bCOORD\b', tail) is not None,
             astray=half_turns_kept(kind, self.program.points[point]),
+            shift=shift,
         )
         self.program.add(step)
 
@@ -215,10 +225,8 @@ class FanucReader(Reader):
         result = _INDEX.match(text)
         return self.points.get(int(result[1])) if name == 'P' and result is not None else None
 
-    def _why(self, name: str, index: str, shift: str) -> str:
+    def _why(self, name: str, index: str) -> str:
         result = _INDEX.match(index)
-        if shift:
-            return f'{shift} shifts it'
         if name == 'P' and result is not None and int(result[1]) in self.untaught:
             return self.untaught[int(result[1])]
         return f'{name}[{index}] is not given here'

@@ -25,6 +25,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
+from .blocks import Blocks, unclear_shift
 from .build import Program, Ref, Step, half_turns_kept
 from .context import Context
 from .controllers import Frame
@@ -36,6 +37,13 @@ _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
 _MOVE = re.compile(r'^[ \t]*(\+?[A-Z]*MOV[A-Z]*)\b[ \t]*([^\r\n]*)', re.M)
 """Also moves that go along with another robot, a positioner or a conveyor: SMOVL, EMOVL, SYMOVL."""
 _SHIFT = re.compile(r'^[ \t]*(SFTON|SFTOF|MULMAT|GETPOS|SETUALM)\b', re.M)
+_BLOCK = re.compile(
+    r'^[ \t]*(?:(IF(?=THEN)|WHILE|FOR|SWITCH)|(ELSE(?:IF)?|CASE|DEFAULT)|(END(?:IF|WHILE|SWITCH)|NEXT)'
+    r')(?:THEN)?(?:EXP)?\b',
+    re.M,
+)
+"""Where the job branches or goes round, another branch, and where they come together."""
+_LABEL = re.compile(r'^[ \t]*\*\w', re.M)
 _FRAME_SET = re.compile(r'^[ \t]*(?:MFRAME|SETTOOL)[ \t]+(UF|TL)#\((\d*)', re.M)
 _TIMER = re.compile(r'^[ \t]*TIMER[ \t]+T=([^\s]+)', re.M)
 _KINDS: dict[str, Kind] = {'MOVJ': 'joint', 'MOVL': 'linear', 'MOVC': 'circular'}
@@ -56,7 +64,7 @@ class InformReader(Reader):
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.tool, self.base, self.form = Frame(''), Frame('', np.eye(4)), 'PULSE'
         self.user = ''
-        self.shifted = ''
+        self.blocks = Blocks(self.program, shift=unclear_shift)
         self.arc: list[Step] = []
 
     def read(self) -> Program:
@@ -64,7 +72,8 @@ class InformReader(Reader):
         result = re.search(r'^//INST\b', self.text, re.M)
         cut = len(self.text) if result is None else result.start()
         self.in_order({_HEAD: self._head, _POINT: self._point}, 0, cut)
-        self.in_order({_MOVE: self._move, _SHIFT: self._shift, _TIMER: self._timer}, cut)
+        found = {_MOVE: self._move, _SHIFT: self._shift, _TIMER: self._timer, _BLOCK: self._block}
+        self.in_order(found | ({_LABEL: self._label} if 'SFTON' in self.text else {}), cut)
         self._close_arc()
         return self.program
 
@@ -123,9 +132,17 @@ class InformReader(Reader):
         self._close_arc()
         where = self.where(result)
         if result[1] == 'SFTON':
-            self.shifted = f'SFTON at {where} shifts it'
+            self.shift = Frame('', why=f'SFTON at {where} shifts it')
         elif result[1] == 'SFTOF':
-            self.shifted = ''
+            self.shift = Frame('')
+
+    def _label(self, result: re.Match[str]) -> None:
+        self._close_arc()
+        self.shift = unclear_shift(self.where(result))
+
+    def _block(self, result: re.Match[str]) -> None:
+        self._close_arc()
+        (self.shift,) = self.blocks.follow(self.where(result), result.groups(), (self.shift,))
 
     def _move(self, result: re.Match[str]) -> None:
         word, rest = result[1], result[2]
@@ -135,12 +152,17 @@ class InformReader(Reader):
         named = re.match(r'C(\d+)\b', rest)
         point = None if named is None else self.points.get(f'C{int(named[1]):05d}')
         other = re.search(r'(?<![A-Z])(?:BC|EC|BP|EX)\d+|\+MOV', rest)
-        if word not in _KINDS or point is None or other or self.shifted:
+        what = rest.split()[0] if rest.split() else 'nothing'
+        why = f'{word} to {what!r} is not understood'
+        if point is None:
             self._close_arc()
-            what = rest.split()[0] if rest.split() else 'nothing'
-            self.unknown(kind, result, self.shifted or f'{word} to {what!r} is not understood')
+            self.unknown(kind, result, why)
             return
         step = self._step(kind, where, point, rest)
+        if word not in _KINDS or other:
+            self._close_arc()
+            self.program.add(replace(step, kind='linear', shift=Frame('', why=why)))
+            return
         if kind == 'circular':
             self.arc.append(step)
         else:
@@ -154,7 +176,7 @@ class InformReader(Reader):
         if len(arc) != 3:
             why = f'{len(arc)} MOVC after each other are not understood, an arc has 3'
             for step in arc:
-                self.program.unknown('linear', step.where, why)
+                self.program.add(replace(step, kind='linear', shift=Frame('', why=why)))
             return
         first, middle, last = arc
         self.program.add(replace(first, kind='linear'))
@@ -173,6 +195,7 @@ class InformReader(Reader):
             _speed(kind, rest),
             level is not None and level[1] == '0',
             astray=half_turns_kept(kind, self.program.points[point]),
+            shift=self.shift,
         )
 
 

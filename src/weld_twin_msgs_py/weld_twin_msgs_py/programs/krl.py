@@ -40,6 +40,8 @@ POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', '
 SPEED = 0.1
 """m/s while the program has not said."""
 _MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
+_SPLINE = re.compile(r'^[ \t]*(?:(?:PTP_)?SPLINE|ENDSPLINE)\b([^\r\n]*)', re.I | re.M)
+"""Where a block of moves begins, with settings that all of them have, and where it ends."""
 _OTHER = re.compile(r'^[ \t]*(SPL|SPTP_REL|ASYPTP)\b', re.I | re.M)
 _DECLARED = re.compile(
     r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(?:GLOBAL[ \t]+)?(?:CONST[ \t]+)?'
@@ -69,6 +71,7 @@ STILL = Frame(
 )
 MOVING = Frame('')
 """Of a tool that moves."""
+WORKED_OUT = Frame('', why='a setting of the move (WITH) has a tool or base that is worked out')
 _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', re.I | re.M)
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
 _ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
@@ -84,7 +87,6 @@ _SETS = {
     for what in ('TOOL', 'BASE')
 }
 """What sets tool or base."""
-_GOTO, _LABEL = r'^[^\r\n]*\bGOTO[ \t]+(\w+)', r'^[ \t]*(\w+)[ \t]*:(?!=)'
 _WITH = re.compile(r'\bWITH\b', re.I)
 _ALONG = re.compile(
     r'EK[ \t]*\([ \t]*MACHINE_DEF\[[ \t]*(\w+)[ \t]*\]\.ROOT[ \t]*,'
@@ -117,10 +119,9 @@ class _State:
 
     tool: Frame = field(default_factory=lambda: Frame(''))
     base: Frame = field(default_factory=lambda: Frame(''))
+    shift: Frame = MOVING
     speed: float = SPEED
     joint_speed: float = 0.1
-    still: bool = False
-    """The tool stands still."""
 
 
 class KrlReader(Reader):
@@ -139,7 +140,10 @@ class KrlReader(Reader):
         self.kinematic = ''
         self.tools: list[Frame] = []
         self.bases: list[Frame] = []
-        self.blocks = Blocks(self.program, (unclear('$TOOL'), unclear('$BASE'), lambda _: STILL))
+        self.blocks = Blocks(
+            self.program, tool=unclear('$TOOL'), base=unclear('$BASE'), shift=lambda _: STILL
+        )
+        self.spline = ''
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
@@ -148,8 +152,7 @@ class KrlReader(Reader):
                 self._declaration(file, result)
         self._frame_tables()
         routines = self.routines_of(_NAMED)
-        aims = {match[1].lower() for match in re.finditer(_GOTO, self.text, re.I | re.M)}
-        labels = [m for m in re.finditer(_LABEL, self.text, re.M) if m[1].lower() in aims]
+        labels = self.labels()
         tool, base = (
             [*labels, *self.calls(routines, sets.search, _CALL)] for sets in _SETS.values()
         )
@@ -162,14 +165,15 @@ class KrlReader(Reader):
                 _WAIT: lambda match: self.dwell(match.span(1)),
                 _ROUTINE: self._routine,
                 _BLOCK: self._block,
+                _SPLINE: lambda match: setattr(self, 'spline', match[1].upper()),
             },
             more=[
                 (lambda _: setattr(self.state, 'tool', OTHER_TOOL), tool),
                 (lambda _: setattr(self.state, 'base', OTHER_BASE), base),
             ],
         )
-        self.settle(OTHER_TOOL, self.tools, tool=True)
-        self.settle(OTHER_BASE, self.bases, tool=False)
+        self.settle('tool', OTHER_TOOL, self.tools)
+        self.settle('base', OTHER_BASE, self.bases)
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
         return self.program
 
@@ -258,16 +262,9 @@ class KrlReader(Reader):
     def _block(self, result: re.Match[str]) -> None:
         """Follow tool, base and whether the tool stands still, through branches and loops."""
         state = self.state
-        now: Frames = (state.tool, state.base, STILL if state.still else MOVING)
-        if result[1]:
-            self.blocks.begin(self.where(result), result[1], now)
-        elif result[2]:
-            now = self.blocks.branch(result[2], now)
-        elif result[3]:
-            now = self.blocks.end(now)
-        else:
-            self.blocks.leave(now)
-        state.tool, state.base, state.still = now[0], now[1], now[2] is STILL
+        now = (state.tool, state.base, state.shift)
+        after = self.blocks.follow(self.where(result), result.groups(), now)
+        state.tool, state.base, state.shift = after
 
     def _use(self, tool: Frame | None, base: Frame | None) -> None:
         """Set tool and base for the moves that follow; None leaves one as it is."""
@@ -304,14 +301,14 @@ class KrlReader(Reader):
                 named = Frame(named.name, why=f'the numbers of {value} are set anew at {where}')
             self._use(*((None, named) if what[:5] == '$BASE' else (named, None)))
         elif what == '$IPO_MODE':
-            self.state.still = value.upper() != '#BASE'
+            self.state.shift = MOVING if value.upper() == '#BASE' else STILL
         elif what == '$VEL.CP':
             self.state.speed = self._speed(start, end, self.state.speed)
         elif what.startswith('$VEL_AXIS'):
             self.state.joint_speed = self._speed(start, end, 10.0) / 100.0
         elif what == 'FDAT_ACT':
             self._use(*self._frames_of(value))
-            self.state.still = False
+            self.state.shift = MOVING
         elif what == 'LDAT_ACT' and value.lower() in self.data:
             speed = self.data[value.lower()].numbers.get('VEL')
             self.state.speed = self.state.speed if speed is None else max(speed.value, LEAST_SPEED)
@@ -412,10 +409,6 @@ class KrlReader(Reader):
                 kind, result, f'what stands behind the target of {word} is not understood'
             )
             return
-        frames = self._own_frames(text[cut:end].upper())
-        if frames is None:
-            self.unknown(kind, result, f'{word} has a tool or base that is worked out')
-            return
         tail = text[parts[-1][1] : end].upper() if parts else ''
         refs = [self._ref(*part) for part in parts]
         if len(refs) < wanted or any(ref is None for ref in refs):
@@ -427,22 +420,23 @@ class KrlReader(Reader):
         if joints and kind != 'joint':
             self.unknown(kind, result, f'{word} to axis positions is not understood')
             return
+        frames = self._own_frames(self.spline, text[cut:end].upper())
         self.program.add(self._step(kind, self.where(result), ends, frames, tail))
 
-    def _own_frames(self, settings: str) -> tuple[Frame, Frame] | None:
-        """Return tool and base of a move, its own settings counted; None where they are open."""
-        frames = [STILL if self.state.still else self.state.tool, self.state.base]
-        for k, what in enumerate(('TOOL', 'BASE')):
-            if f'${what}' not in settings:
-                continue
-            named = re.search(rf'\${what}\s*=\s*S{what}2?\s*\(\s*(\w+)', settings)
-            if named is None:
-                return None
-            frames[k] = self._frames_of(named[1])[k]
-        return frames[0], frames[1]
+    def _own_frames(self, *settings: str) -> Frames:
+        """Return tool, base and shift of a move, settings of its block and its own counted."""
+        frames = [self.state.tool, self.state.base, self.state.shift]
+        for own in settings:
+            for k, what in enumerate(('TOOL', 'BASE')):
+                if f'${what}' not in own:
+                    continue
+                named = re.search(rf'\${what}\s*=\s*S{what}2?\s*\(\s*(\w+)', own)
+                frames[k] = WORKED_OUT if named is None else self._frames_of(named[1])[k]
+                frames[2] = MOVING if what == 'TOOL' else frames[2]
+        return tuple(frames)
 
     def _step(
-        self, kind: Kind, where: str, ends: Sequence[int], frames: tuple[Frame, Frame], tail: str
+        self, kind: Kind, where: str, ends: Sequence[int], frames: Frames, tail: str
     ) -> Step:
         speed = self.state.joint_speed if kind == 'joint' else self.state.speed
         turn = self.turns.get(ends[-1])
@@ -452,12 +446,13 @@ class KrlReader(Reader):
             where,
             Ref(ends[-1]),
             Ref(ends[0]) if kind == 'circular' else None,
-            *frames,
+            *frames[:2],
             speed if own is None else max(float(own[1].rstrip('.')), LEAST_SPEED),
             re.search(r'\bC_(DIS|PTP|VEL|ORI|SPL)\b', tail) is None,
             suits=None if turn is None else turn_bits(turn),
             # Straight moves take no notice of it.
             astray=signs_kept(turn) if turn is not None and kind == 'joint' else None,
+            shift=frames[2],
         )
 
     def _parts(self, start: int, end: int) -> list[tuple[int, int]]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, quadrants
+from .blocks import Blocks, unclear_shift
+from .build import Program, Ref, Step, Suits, exchange, hold_if_used_elsewhere, quadrants
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -49,6 +51,8 @@ _MOVE = re.compile(
     r'(?=[\s\\])(?!\s*:=)',
     re.I,
 )
+_ACTS = re.compile(r'(?:DO|AO|GO|Sync)\Z', re.I)
+"""Ends the name of a move that says behind its tool what happens at its point."""
 _OTHER = re.compile(
     r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|EGMRun\w+|Ind[ARCD]Move|StepBwdPath|'
     r'PathRecMove\w+|MoveExtJ)\b',
@@ -67,9 +71,18 @@ _ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.(?!tload\b)
 """What may be a tool or a work object, and what part of it; what hangs at a tool moves no frame."""
 _DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
-_ROUTINE = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)\b', re.I | re.M)
-_NAMED = re.compile(r'^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+(\w+)', re.I | re.M)
-_CALLED = r'(?:^|(?<=;))[ \t]*({})\b(?!\s*:=)'
+_ROUTINE = re.compile(
+    r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC[ \t]+\w+|TRAP)[ \t]+(\w+)', re.I | re.M
+)
+_CALLED = r'(?:^|(?<=;))[ \t]*(?:IF\b[^;\r\n]*?[ \t)])?({})(?=[ \t]*[;\\]|[ \t]+[\w"\[])(?!\s*:=)'
+_BLOCK = re.compile(
+    r'^[ \t]*(?:(IF(?=\b[^;]{0,500}?\bTHEN\b)|TEST|FOR|WHILE)|(ELSEIF|ELSE|CASE|DEFAULT)|'
+    r'(END(?:IF|TEST|FOR|WHILE)))\b',
+    re.I | re.M,
+)
+"""Where the program branches or goes round, another branch, and where they come together."""
+_COMPACT = re.compile(r'\bIF\b(?![^;]*\bTHEN\b)[^;\r\n]*\Z', re.I)
+"""A condition of the one statement that follows it."""
 _CONF = re.compile(r'\bConf([JL])\s*\\(On|Off)\b', re.I)
 _KINDS: dict[str, Kind] = {'absj': 'joint', 'j': 'joint', 'l': 'linear', 'c': 'circular'}
 
@@ -98,14 +111,19 @@ class RapidReader(Reader):
         self.used: set[int] = set()
         self.suits: dict[int, Suits] = {}
         self.config = {'j': True, 'l': True}
-        self.displaced = ''
+        self.entered: dict[str, tuple[Frame, list[Frame]]] = {}
+        """By routine the shift with which it begins, and those where it is called."""
+        self.blocks = Blocks(self.program, shift=unclear_shift)
         self.unit = ''
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
-        displacing = self.calls(self.routines_of(_NAMED), _displaces, _CALLED)
+        routines = self.routines_of(_ROUTINE)
+        called = self.calls(routines, lambda _: True, _CALLED)
+        self.entered = {call[1].lower(): (Frame(call[1]), []) for call in called}
+        labels = self.labels() if re.search('|'.join(_DISPLACED), self.text, re.I) else []
         self.in_order(
             {
                 _MOVE: self._move,
@@ -113,10 +131,16 @@ class RapidReader(Reader):
                 _WAIT: lambda match: self.dwell(match.span(2)),
                 _CONF: self._conf,
                 _CALL: self._call,
-                _ROUTINE: self.new_piece,
+                _ROUTINE: self._routine,
+                _BLOCK: self._block,
             },
-            more=[(self._displacing, displacing)],
+            more=[
+                (lambda call: self.entered[call[1].lower()][1].append(self.shift), called),
+                (self._displacing, self.calls(routines, _displaces, _CALLED)),
+                (lambda label: setattr(self, 'shift', unclear_shift(self.where(label))), labels),
+            ],
         )
+        self._settle_shifts()
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
         return self.program
 
@@ -247,14 +271,33 @@ class RapidReader(Reader):
     def _other(self, result: re.Match[str]) -> None:
         where = self.where(result)
         if result[1].lower().endswith('offsoff') or result[1].lower() == 'pdispoff':
-            self.displaced = ''
+            line = self.text[self.text.rfind('\n', 0, result.start()) + 1 : result.start()]
+            self.shift = self.shift if _COMPACT.search(line) else Frame('')
         elif result[1].lower() in _DISPLACED:
-            self.displaced = f'{result[1]} at {where} displaces it'
+            self.shift = Frame('', why=f'{result[1]} at {where} displaces it')
         else:
             self.unknown('linear', result, f'{result[1]} is not understood')
 
     def _displacing(self, result: re.Match[str]) -> None:
-        self.displaced = f'{result[1]}, called at {self.where(result, 1)}, displaces it'
+        self.shift = Frame('', why=f'{result[1]}, called at {self.where(result, 1)}, displaces it')
+
+    def _routine(self, result: re.Match[str]) -> None:
+        self.new_piece(result)
+        self.shift = self.entered.get(result[1].lower(), (Frame(''), []))[0]
+
+    def _block(self, result: re.Match[str]) -> None:
+        (self.shift,) = self.blocks.follow(self.where(result), result.groups(), (self.shift,))
+
+    def _settle_shifts(self) -> None:
+        """Let the moves of routines know that they are called where points are displaced."""
+        own = {begun.name: begun for begun, _ in self.entered.values()}
+        for _ in own:  # it may come through as many calls
+            for begun, shifts in self.entered.values():
+                displaced = [shift for one in shifts if (shift := own.get(one.name, one)).why]
+                own[begun.name] = (displaced or [own[begun.name]])[0]
+        for piece in self.program.pieces:
+            for begun, _ in self.entered.values():
+                exchange(piece, 'shift', begun, own[begun.name])
 
     def _call(self, result: re.Match[str]) -> None:
         """Take an instruction that nobody knows for a move if it is handed what moves need."""
@@ -279,13 +322,14 @@ class RapidReader(Reader):
             raise DataError(f'{where}: the statement {result[0]} is not closed by ;')
         parts = self._arguments(result.end(), end)
         wanted = 2 if kind == 'circular' else 1
+        if _ACTS.search(result[0]):
+            parts = parts[: wanted + 3]
         if len(parts) < wanted + 3:
             raise DataError(f'{where}: {result[0]} needs a point, a speed, a zone and a tool')
         refs = [self._ref(*part, word == 'absj') for part in parts[:wanted]]
-        if self.displaced or any(ref is None for ref in refs):
+        if any(ref is None for ref in refs):
             text = self.source.text[slice(*parts[wanted - 1])].strip()
-            why = self.displaced or f'{result[0]} goes to {text!r}, which is not given here'
-            self.unknown(kind, result, why)
+            self.unknown(kind, result, f'{result[0]} goes to {text!r}, which is not given here')
             return
         places = [ref for ref in refs if ref is not None]
         tool, base = self._frames(*parts[-1])
@@ -294,7 +338,8 @@ class RapidReader(Reader):
         asked = self.config['j' if kind == 'joint' else 'l']
         suits = self.suits.get(places[-1].point) if asked else None
         via = places[0] if kind == 'circular' else None
-        self.program.add(Step(kind, where, places[-1], via, tool, base, speed, stop, suits=suits))
+        step = Step(kind, where, places[-1], via, tool, base, speed, stop, suits=suits)
+        self.program.add(replace(step, shift=self.shift))
 
     def _arguments(self, start: int, end: int) -> list[tuple[int, int]]:
         """Return the arguments of a move, the switches before the first left out."""
@@ -332,7 +377,6 @@ class RapidReader(Reader):
         if closing(self.source, self.text, opening) != end - 1:
             return None
         parts = self.pieces(opening + 1, end - 1)
-        point = self._named(*parts[0])
         cut = self._before_switch(*parts[-1])
         turns = self._switches(cut, parts[-1][1])
         try:
@@ -340,7 +384,7 @@ class RapidReader(Reader):
             shift = [self.number(*part, 'a shift').value * 1e-3 for part in spans]
         except DataError:
             return None
-        if point is None or turns is None or len(shift) != 3:
+        if turns is None or len(shift) != 3 or (point := self._named(*parts[0])) is None:
             return None
         pose = transform(np.eye(3), np.array(shift))
         if word == 'offs':

@@ -7,13 +7,12 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program
+from .build import Program, exchange
 from .context import Context
 from .controllers import Frame
 from .source import Number, Source, masked, number_at, split_outside, stripped
@@ -21,6 +20,13 @@ from .source import Number, Source, masked, number_at, split_outside, stripped
 Span = tuple[int, int]
 """Where a piece of text begins and ends."""
 Handler = Callable[[re.Match[str]], None]
+_HANDED = re.compile(
+    r'^[ \t]*(?:\w+[ \t]+)?(?:PROC|DEF|(?:FUNC|DEFFCT)[ \t]+\w+)[ \t]+\w+[ \t]*\(([^)]*)\)',
+    re.I | re.M,
+)
+"""Head of a routine, and what it is handed."""
+_GOTO = re.compile(r'^[^\r\n]*\bGOTO[ \t]+(\w+)', re.I | re.M)
+_LABEL = re.compile(r'^[ \t]*(\w+)[ \t]*:(?!=)', re.M)
 LEAST_SPEED = 1e-4
 """Speed [m/s, or share of full speed] below which nothing moves."""
 
@@ -38,6 +44,8 @@ class Reader(ABC):
         self.text = self.texts[0]
         self.program = Program('', self.sources)
         self.again: dict[str, str] = {}
+        self.shift = Frame('')
+        """Why moves go elsewhere than their points say, where the text is read."""
         self.routines = 0
 
     @abstractmethod
@@ -91,11 +99,17 @@ class Reader(ABC):
             names |= more
         return []
 
+    def labels(self) -> list[re.Match[str]]:
+        """Return the labels that a GOTO leads to, of languages that write both alike."""
+        aims = {match[1].lower() for match in _GOTO.finditer(self.text)}
+        return [match for match in _LABEL.finditer(self.text) if match[1].lower() in aims]
+
     def set_again(self, pattern: re.Pattern[str]) -> dict[str, str]:
         """
         Return, by name, where what is set more than once, or in parts, is set so.
 
-        What it is at a move hangs on what ran before, which nobody follows here.
+        What it is at a move hangs on what ran before, which nobody follows here. So does what a
+        routine is handed under that name.
 
         pattern: its first group is the name, its second is empty where the whole is set. Names are
         in lower case where it ignores case, as its language does.
@@ -108,6 +122,10 @@ class Reader(ABC):
                 if match[2] or name in whole:
                     out.setdefault(name, source.where(match.start(1)))
                 whole.add(name)
+            for head in _HANDED.finditer(text):
+                for name in re.findall(r'\w+', head[1]):
+                    name = name.lower() if pattern.flags & re.IGNORECASE else name
+                    out.setdefault(name, source.where(head.start()))
         return out
 
     def numbered_set(self, pattern: re.Pattern[str]) -> None:
@@ -152,24 +170,20 @@ class Reader(ABC):
         self.routines += 1
         self.program.new_piece()
 
-    def settle(self, inherited: Frame, own: Sequence[Frame], *, tool: bool) -> None:
+    def settle(self, name: str, inherited: Frame, own: Sequence[Frame]) -> None:
         """
         Give moves that stand before any frame of their routine the one that the program sets.
 
         Where it sets several, nobody knows which holds when the routine is called.
 
-        inherited: what stands in these moves. own: what the program sets.
+        name: of the field of a move. inherited: what stands in these moves. own: what the program sets.
         """
         values = {(f.name, f.why, None if f.value is None else f.value.tobytes()) for f in own}
         if len(values) > 1:
             return
         only = own[0] if own else Frame('')
         for piece in self.program.pieces:
-            for k, step in enumerate(piece):
-                if tool and step.tool is inherited:
-                    piece[k] = replace(step, tool=only)
-                elif not tool and step.base is inherited:
-                    piece[k] = replace(step, base=only)
+            exchange(piece, name, inherited, only)
 
     def unknown(self, kind: Kind, match: re.Match[str], why: str) -> None:
         """Add a move that is not understood."""

@@ -77,9 +77,9 @@ class UrscriptReader(Reader):
         calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
         self._declare()
         routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
-        blocks = Blocks(self.program, (unclear('set_tcp'),))
-        words = [*_WORD.finditer(self.text), *calls]
-        for result in sorted(words, key=lambda each: each.start()):
+        blocks = Blocks(self.program, tool=unclear('set_tcp'))
+        found = [*_WORD.finditer(self.text), *calls]
+        for result in sorted(found, key=lambda each: each.start()):
             if result.re is not _WORD:
                 self.tool = OTHER_TOOL
             elif result[5]:
@@ -88,20 +88,15 @@ class UrscriptReader(Reader):
                 routines.append(self.tool)
                 self.new_piece(result)
                 self.tool = OTHER_TOOL if self.routines > 1 else self.tool
-            elif result[7]:
-                routines.append(None)
-                blocks.begin(self.where(result), result[7], (self.tool,))
-            elif result[8]:
-                (self.tool,) = blocks.branch(result[8], (self.tool,))
-            elif result[10]:
-                blocks.leave((self.tool,))
             elif result[9] and routines and (around := routines.pop()) is not None:
                 # To define a routine moves nothing: what stands around it goes on as before.
                 self.program.new_piece()
                 self.tool = around
-            elif result[9]:
-                (self.tool,) = blocks.end((self.tool,))
-        self.settle(OTHER_TOOL, self.tools, tool=True)
+            else:
+                routines += [None] if result[7] else []
+                words = result.groups()[6:9]
+                (self.tool,) = blocks.follow(self.where(result), words, (self.tool,))
+        self.settle('tool', OTHER_TOOL, self.tools)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])
         for name, where in self.again.items():
@@ -218,8 +213,9 @@ class UrscriptReader(Reader):
             return self._near(parts)
         if len(parts) != 2:
             return None
-        frame, point = self._frame(*parts[0]), self._point(*parts[1])
-        if frame is None or point is None:
+        frame = self._frame(*parts[0])
+        point = None if frame is None else self._point(*parts[1])
+        if point is None:
             return None
         # The frame counts as a base: the point itself leads, and is moved in that frame.
         return Ref(point, frame), None

@@ -40,8 +40,8 @@ class Move(NamedTuple):
     """'joint', 'linear', 'circular'; or 'unknown', after which nobody knows where the arm is."""
     end: Use | None
     """
-    None for an unknown move. Joint positions of a linear move stand for the pose they make, and say how
-    an arm of more than six joints stands there.
+    None where nobody knows the point. Joint positions of a linear move stand for the pose they make, and
+    say how an arm of more than six joints stands there.
     """
     tool: Array
     """``T_flange_tool``, the flange that of the robot's model, shape (4, 4) [m]."""

@@ -138,7 +138,7 @@ def _pieces(course: _Course, moves: Sequence[Move], start: Array | None) -> list
 
 def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a move that begins at joint positions, None for an unknown place."""
-    if move.end is None:
+    if move.end is None or move.kind == 'unknown':
         raise PathError(move.why or 'this move is not understood')
     arm = course.robot.with_frames(base=np.eye(4), tool=move.tool)
     chain = CarriedArm(arm, course.program.external)

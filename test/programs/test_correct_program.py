@@ -255,7 +255,7 @@ FANUC_TURN = """/PROG  P
 P[1]{{
    GP1:
 	UF : 0, UT : 1,
-	J1= 8.0 deg, J2= 15.0 deg, J3= -10.0 deg, J4= 4.0 deg, J5= -75.0 deg, J6= {a6} deg
+	J1= {q[0]} deg, J2= {q[1]} deg, J3= -10.0 deg, J4= {q[3]} deg, J5= {q[4]} deg, J6= {q[5]} deg
 }};
 P[2]{{
    GP1:
@@ -268,45 +268,79 @@ P[2]{{
 KUKA_TURN = """DEF P()
 $TOOL=$NULLFRAME
 $BASE=$NULLFRAME
-PTP {{A1 8, A2 -85, A3 100, A4 5, A5 70, A6 {a6}}}
+PTP {{A1 8, A2 -85, A3 100, A4 5, A5 {q[4]}, A6 {q[5]}}}
 PTP {{X {0}, Y {1}, Z {2}, A {5}, B {4}, C {3}, S 2, T {turn}}}
 END
 """
 
+ABB_TURN = """MODULE P
+PROC main()
+ConfJ\\On;
+MoveAbsJ [{q},[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
+MoveJ [[{0},{1},{2}],{quat},[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;
+ENDPROC
+ENDMODULE
+"""
+INFORM_TURN = """/JOB
+//NAME P
+//POS
+///TOOL 1
+///POSTYPE PULSE
+C00000=8000,15000,5000,{q[3]}E3,-75000,3000
+///POSTYPE ROBOT
+C00001={0},{1},{2},{3},{4},{5}
+//INST
+NOP
+MOVJ C00000 VJ=10.00
+MOVJ C00001 VJ=10.00
+END
+"""
+TURNS = {'/PRO': '.ls', 'DEF ': '.src', 'MODU': '.mod', '/JOB': '.jbi'}
+
 
 @pytest.mark.parametrize(
-    ('robot', 'name', 'text', 'a6', 'turn', 'left'),
+    ('robot', 'text', 'axis', 'angle', 'turn', 'left'),
     [
-        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.02, 2, True),
-        ('kuka_kr16_2', 'p.src', KUKA_TURN, -0.02, 34, False),
-        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.0, 34, False),
-        ('kuka_kr16_2', 'p.src', KUKA_TURN, 0.0, 2, True),
-        ('kuka_kr16_2', 'p.src', KUKA_TURN, 3.0, 2, False),
-        ('fanuc_m10ia', 'p.ls', FANUC_TURN, -179.98, 0, True),
-        ('fanuc_m10ia', 'p.ls', FANUC_TURN, -179.9, 0, False),
+        ('kuka_kr16_2', KUKA_TURN, 6, 0.02, 2, True),
+        ('kuka_kr16_2', KUKA_TURN, 6, -0.02, 34, False),
+        ('kuka_kr16_2', KUKA_TURN, 6, 0.0, 34, False),
+        ('kuka_kr16_2', KUKA_TURN, 6, 0.0, 2, True),
+        ('kuka_kr16_2', KUKA_TURN, 6, 3.0, 2, False),
+        ('fanuc_m10ia', FANUC_TURN, 6, -179.98, 0, True),
+        ('fanuc_m10ia', FANUC_TURN, 6, -179.9, 0, False),
+        ('fanuc_m10ia', FANUC_TURN, 5, 0.02, 0, True),
+        ('fanuc_m10ia', FANUC_TURN, 5, 3.0, 0, False),
+        ('abb_irb1600', ABB_TURN, 5, 0.02, 0, True),
+        ('abb_irb1600', ABB_TURN.replace('On', 'Off'), 5, 0.02, 0, False),
+        ('yaskawa_ma1440', INFORM_TURN, 4, 90.02, 0, True),
+        ('yaskawa_ma1440', INFORM_TURN, 4, 95.0, 0, False),
     ],
 )
 def test_an_axis_that_would_pass_where_a_flag_changes_is_left(
-    robot, name, text, a6, turn, left, tmp_path
+    robot, text, axis, angle, turn, left, tmp_path
 ):
-    # The last axis stands off by 0.057 degrees, and is to be commanded that much lower.
-    arm = wt.load(robot)
-    near = {'kuka_kr16_2': [8, -85, 100, 5, 70, a6], 'fanuc_m10ia': [8, 15, 5, 4, -75, a6]}[robot]
+    # The axis stands off by 0.057 degrees, and is to be commanded that much lower.
+    arm, name = wt.load(robot), f'p{TURNS[text[:4]]}'
+    near = [8, -85, 100, 5, 70, 3] if robot == 'kuka_kr16_2' else [8, 15, 5, 4, -75, 3]
+    near[axis - 1] = angle
     where = tool_pose(arm, np.radians(near), arm.T_flange_tool)
-    height = 0.45 if name == 'p.ls' else 0.0
+    height = 0.45 if name in ('p.ls', 'p.jbi') else 0.0
+    x, y, z, w = Rotation.from_matrix(where[:3, :3]).as_quat().tolist()
     turned = Rotation.from_matrix(where[:3, :3]).as_euler('xyz', degrees=True)
     place = [*(where[:3, 3] - [0.0, 0.0, height]) * 1e3, *turned]
     (tmp_path / name).write_text(
-        text.format(*(f'{value:.4f}' for value in place), a6=a6, turn=turn)
+        text.format(*(f'{value:.4f}' for value in place), q=near, turn=turn, quat=[w, x, y, z])
     )
-    last = arm.joint_names[-1]
-    (tmp_path / 'off.yaml').write_text(f'- {{effect: joint_offset, joint: {last}, offset: 1e-3}}')
+    off = f'- {{effect: joint_offset, joint: {arm.joint_names[axis - 1]}, offset: 1e-3}}'
+    (tmp_path / 'off.yaml').write_text(off)
     said = weld_twin(
         *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'off.yaml', '--tool', '1=0,0,0,0,0,0'),
+        *('--model', tmp_path / 'off.yaml'),
+        *(['--tool', '1=0,0,0,0,0,0'] if height else []),
+        *(['--pulses-per-degree', ','.join(['1000'] * 6)] if name == 'p.jbi' else []),
     )
     assert said.code == 0, said.err
-    assert ('axis 6 would pass an angle at which the flags' in said.out) == left, said.out
+    assert (f'axis {axis} would pass an angle at which the flags' in said.out) == left, said.out
 
 
 def test_the_start_is_given_as_the_pendant_shows_it(tmp_path):

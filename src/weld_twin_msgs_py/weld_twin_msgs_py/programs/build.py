@@ -155,9 +155,10 @@ class Program:
 
 def exchange(moves: list[Step], name: str, held: Frame, other: Frame, first: int = 0) -> None:
     """Give moves from one on, that hold a frame in a field of a name, another one there."""
+    new: dict[str, Any] = {name: other}
     for k, step in enumerate(moves[first:], first):
         if getattr(step, name) is held:
-            moves[k] = replace(step, **{name: other})
+            moves[k] = replace(step, **new)
 
 
 def hold_if_used_elsewhere(
@@ -290,6 +291,14 @@ FLAG_DOUBT = np.radians(1e-3)
 """An axis this near where a flag changes may count to either side: points have no more digits."""
 
 
+Flag = tuple[int, float, float]
+"""An axis, one of the angles at which a flag of it changes, and after how much the next is [180 deg]."""
+TURNS: tuple[Flag, ...] = ((1, 1.0, 2.0), (4, 1.0, 2.0), (6, 1.0, 2.0))
+"""The counted turns of axes 1, 4 and 6."""
+WRIST: Flag = (5, 0.0, 2.0)
+"""The side to which the wrist is bent."""
+
+
 def signs_kept(turn: int) -> Astray:
     """Return what tells the axes that have not the signs of T, as `turn_bits` takes it."""
 
@@ -305,21 +314,30 @@ def signs_kept(turn: int) -> Astray:
     return of
 
 
-def half_turns_kept(kind: Kind, point: Point) -> Astray | None:
-    """Return what tells the axes that leave their counted turns; of joint moves to poses alone."""
-    return _half_turns_kept if kind == 'joint' and not point.notation.joints else None
+def flags_kept(kind: Kind, point: Point, flags: Sequence[Flag]) -> Astray | None:
+    """
+    Return what tells the axes that pass where flags change; of joint moves to poses alone.
 
+    flags: of the controller. One that it has not costs a point, one that is missing turns an arm.
+    """
+    if kind != 'joint' or point.notation.joints:
+        return None
 
-def _half_turns_kept(controller: Controller) -> Any:
-    """Return what tells the axes 1, 4 and 6 that pass 180 degrees, where flags count their turns."""
+    def of(controller: Controller) -> Any:
+        def astray(before: Array, after: Array) -> tuple[int, ...]:
+            both = np.stack([_shown(controller, q) for q in (before, after)])
+            moved = np.abs(both[1] - both[0]) > FLAG_DOUBT
+            out = set[int]()
+            for axis, angle, period in flags:
+                at = both[:, axis - 1 : axis]
+                sides = np.floor((at - angle * np.pi) / (period * np.pi))
+                if (sides[0] != sides[1]).any() and moved[axis - 1]:
+                    out.add(axis)
+            return tuple(sorted(out))
 
-    def astray(before: Array, after: Array) -> tuple[int, ...]:
-        both = np.stack([_shown(controller, q) for q in (before, after)])
-        turns = np.round(both / (2.0 * np.pi))
-        passed = (turns[0] != turns[1]) & (np.abs(both[1] - both[0]) > FLAG_DOUBT)
-        return tuple(axis for axis in (1, 4, 6) if passed[axis - 1 : axis].any())
+        return astray
 
-    return astray
+    return of
 
 
 def _shown(controller: Controller, q: Array) -> Array:

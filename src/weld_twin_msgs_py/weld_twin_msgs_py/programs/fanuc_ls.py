@@ -24,7 +24,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
 from .blocks import Blocks, unclear_shift
-from .build import Program, Ref, Step, half_turns_kept
+from .build import TURNS, WRIST, Program, Ref, Step, flags_kept
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -216,7 +216,7 @@ class FanucReader(Reader):
             _speed(kind, tail),
             re.search(r'\bFINE\b', tail) is not None,
             along=re.search(r'\bCOORD\b', tail) is not None,
-            astray=half_turns_kept(kind, self.program.points[point]),
+            astray=flags_kept(kind, self.program.points[point], (*TURNS, WRIST)),
             shift=shift,
         )
         self.program.add(step)

@@ -26,10 +26,10 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
 from .blocks import Blocks, unclear_shift
-from .build import Program, Ref, Step, half_turns_kept
+from .build import TURNS, Program, Ref, Step, flags_kept
 from .context import Context
 from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .reader import LEAST_SPEED, Handler, Reader
 from .source import YASKAWA_POSE, Notation, Number, Source
 
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
@@ -49,6 +49,8 @@ _TIMER = re.compile(r'^[ \t]*TIMER[ \t]+T=([^\s]+)', re.M)
 _KINDS: dict[str, Kind] = {'MOVJ': 'joint', 'MOVL': 'linear', 'MOVC': 'circular'}
 SPEED, JOINT_SPEED = 0.1, 0.1
 """m/s, and share of full speed, where a move does not say."""
+FLAGS = (*TURNS, (4, 0.5, 1.0))
+"""Of RCONF; the wrist counts as flipped by the side on which axis 4 is, which changes at 90 degrees."""
 CM_PER_MIN = 0.01 / 60.0
 """m/s of a speed in cm/min, as ``V=50cm/min`` has it on arc welding controllers."""
 
@@ -72,7 +74,12 @@ class InformReader(Reader):
         result = re.search(r'^//INST\b', self.text, re.M)
         cut = len(self.text) if result is None else result.start()
         self.in_order({_HEAD: self._head, _POINT: self._point}, 0, cut)
-        found = {_MOVE: self._move, _SHIFT: self._shift, _TIMER: self._timer, _BLOCK: self._block}
+        found: dict[re.Pattern[str], Handler] = {
+            _MOVE: self._move,
+            _SHIFT: self._shift,
+            _TIMER: self._timer,
+            _BLOCK: self._block,
+        }
         self.in_order(found | ({_LABEL: self._label} if 'SFTON' in self.text else {}), cut)
         self._close_arc()
         return self.program
@@ -194,7 +201,7 @@ class InformReader(Reader):
             base,
             _speed(kind, rest),
             level is not None and level[1] == '0',
-            astray=half_turns_kept(kind, self.program.points[point]),
+            astray=flags_kept(kind, self.program.points[point], FLAGS),
             shift=self.shift,
         )
 

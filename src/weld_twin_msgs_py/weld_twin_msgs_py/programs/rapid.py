@@ -31,7 +31,17 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
 from .blocks import Blocks, unclear_shift
-from .build import Program, Ref, Step, Suits, exchange, hold_if_used_elsewhere, quadrants
+from .build import (
+    WRIST,
+    Program,
+    Ref,
+    Step,
+    Suits,
+    exchange,
+    flags_kept,
+    hold_if_used_elsewhere,
+    quadrants,
+)
 from .context import Context
 from .controllers import Frame
 from .reader import LEAST_SPEED, Reader
@@ -339,7 +349,10 @@ class RapidReader(Reader):
         suits = self.suits.get(places[-1].point) if asked else None
         via = places[0] if kind == 'circular' else None
         step = Step(kind, where, places[-1], via, tool, base, speed, stop, suits=suits)
-        self.program.add(replace(step, shift=self.shift))
+        point = self.program.points[places[-1].point]
+        # It counts quadrants, of which the nearest is taken; the side of the wrist is one of two.
+        astray = flags_kept(kind, point, (WRIST,)) if asked else None
+        self.program.add(replace(step, astray=astray, shift=self.shift))
 
     def _arguments(self, start: int, end: int) -> list[tuple[int, int]]:
         """Return the arguments of a move, the switches before the first left out."""

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.predicting.allowed import Conditioning
-from weld_twin_core.diagnosis.predicting.dispersion import dispersion
+from weld_twin_core.diagnosis.predicting.allowed import Conditioning, dispersion
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows
 
 REGIONS, EACH, COUNT = 3, 150, 60

@@ -34,7 +34,7 @@ from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
 """Knots of a curve: enough for two waves of an angle, and few enough for a minute of motion."""
-FINE, LEAST_FINE = 21, 400
+FINE, LEAST_FINE = 3 * KNOTS['angle'], 400
 """Knots of a second curve over the angle, for the waves of a gear; and measurements from which it
 is tried: twenty for each knot."""
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
@@ -45,12 +45,8 @@ WANDERS = 16
 LOOSE = 100.0
 """Carriers may be so many times their typical size: their group has been found by its columns."""
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
-FIELD = 27
+FIELD = 3 * 9
 """Columns of a smooth field: every coordinate over the place, up to its squares."""
-RANGES = 4
-"""Knots over the distance from the instrument: straight, bent, and bent back."""
-WARM = 3
-"""Knots over the temperature."""
 GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
 """Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
 what takes a tenth of a radian to build up."""
@@ -58,7 +54,8 @@ TURNED = 1e-4
 """Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
 have changed flanks by then."""
 BENT = 4
-"""Knots over the angle for each way: straight, bent, and bent back."""
+"""Knots over the distance from the instrument, and over the angle for each way: straight, bent, and
+bent back."""
 SHARES = (0.02, 0.1, 0.4)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
 NEAR = 1e-3
@@ -223,7 +220,7 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
         for law in (field, linear, sight):
             about = [np.concatenate([_shifted(part), part]) for part in law]
             yield 'instrument', 'place', about, ()
-        knots = _spaced([_distance(maker) for maker in features], RANGES, NEAR)
+        knots = _spaced([_distance(maker) for maker in features], BENT, NEAR)
         if knots is not None:
             yield 'instrument', 'place', [_sighted(maker, knots) for maker in features], ()
     if all(m.view.wrench is not None for m in features):
@@ -241,7 +238,7 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
         yield 'load', 'load', sprung, ()
     if all(maker.view.temperature is not None for maker in features):
         warmth = [np.asarray(maker.view.temperature) for maker in features]
-        knots = _spaced(warmth, WARM, LEAST['temperature'])
+        knots = _spaced(warmth, KNOTS['temperature'], LEAST['temperature'])
         if knots is not None:
             each = [(_grown(maker)[None], w) for maker, w in zip(features, warmth, strict=True)]
             yield 'base', 'temperature', [g * basis(knots, w)[:, None] for g, w in each], ()

@@ -110,7 +110,7 @@ def calibrated(
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
         told, levels = _stated_of(k, cause, families, before, form, learned)
-        reported.append(told)
+        reported.append(replace(told, sure=learned.sure('cause', told.probability)))
         said += levels
     kinds = [one for one in said if one.kind == 'name of many']
     of_rows = [cause for cause in reported if cause.row is not None]
@@ -147,19 +147,19 @@ def _stated_of(
         own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         levels.append(replace(name, cause=k))
-        return _of_row(cause, row, learned, *_probabilities(levels)), levels
+        return _of_row(cause, row, *_probabilities(levels)), levels
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
         kind = of_kind(cause, family, len(families), before.floor)
         each = (*both, 'name')
         levels = [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
-        return _of_kind(cause, learned, *_probabilities(levels)), levels
+        return _of_kind(cause, *_probabilities(levels)), levels
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]
     levels = [
         _told(f'{level} of the rest', k, more, learned)
         for level, more in zip(both, own, strict=True)
     ]
-    return _of_rest(cause, learned, *_probabilities(levels)), levels
+    return _of_rest(cause, *_probabilities(levels)), levels
 
 
 def _probabilities(levels: Sequence[Statement]) -> list[float]:
@@ -183,9 +183,7 @@ def _of_answer(
     return out, [complete, answer]
 
 
-def _of_row(
-    cause: Cause, row: Row, learned: Calibration, place: float, dependence: float, name: float
-) -> Cause:
+def _of_row(cause: Cause, row: Row, place: float, dependence: float, name: float) -> Cause:
     """
     Return the cause of an effect found with the probabilities of its place, dependence and name.
 
@@ -202,13 +200,10 @@ def _of_row(
         dependence=_mixed(dependences, _led(cause.dependence, dependence), 1.0 - name),
         name=named,
         probability=name,
-        sure=learned.sure('cause', name),
     )
 
 
-def _of_kind(
-    cause: Cause, learned: Calibration, place: float, dependence: float, name: float
-) -> Cause:
+def _of_kind(cause: Cause, place: float, dependence: float, name: float) -> Cause:
     """Return a kind of many with its probabilities, which its joints and its likes share."""
     return replace(
         cause,
@@ -216,19 +211,16 @@ def _of_kind(
         dependence=_scaled(cause.dependence, dependence),
         name=_scaled(cause.name, name),
         probability=name,
-        sure=learned.sure('cause', name),
     )
 
 
-def _of_rest(cause: Cause, learned: Calibration, place: float, dependence: float) -> Cause:
+def _of_rest(cause: Cause, place: float, dependence: float) -> Cause:
     """Return what has no name with the probabilities of its place and dependence."""
-    reported = place if cause.place else 0.0
     return replace(
         cause,
         place=_led(cause.place, place),
         dependence=_led(cause.dependence, dependence),
-        probability=reported,
-        sure=learned.sure('cause', reported),
+        probability=place if cause.place else 0.0,
     )
 
 

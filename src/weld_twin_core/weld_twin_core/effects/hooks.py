@@ -152,6 +152,10 @@ class TwinHooks(_Hooks):
         """Return what is left of it for the robot ever after; None for what a set-up had."""
         return None if self.effect.traits.of_setup else self.effect
 
+    def jump(self, view: View) -> Shift:
+        """Return by how much a law that jumps does so from each sample to the next, shape (N - 1,)."""
+        return {channel: np.diff(value) for channel, value in self.effect.displace(view).items()}
+
     def off_outside(self) -> float:
         """Return how far its joint may be off where nothing was recorded, [rad or m]."""
         return 0.0

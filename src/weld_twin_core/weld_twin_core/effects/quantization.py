@@ -12,7 +12,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
-from .hooks import FitHooks, Hooked, SearchHooks, Traits
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -62,6 +62,16 @@ class _Fit(FitHooks):
         return [Quantization(self.effect.joint, float(step)) for step in steps], displaced
 
 
+class _Twin(TwinHooks):
+    effect: Quantization
+
+    def jump(self, view: View) -> Shift:
+        """Return a step wherever a stair is climbed: between, its joint goes on and jumps nowhere."""
+        joint, step = view.robot.index(self.effect.joint), float(self.effect.step)
+        stairs = np.rint(view.joint(joint) / (step or np.inf))
+        return {('q', joint): step * np.sign(np.diff(stairs))}
+
+
 @register
 class Quantization(Effect):
     """Rounding to a multiple of ``step``; a step of zero rounds nothing."""
@@ -91,6 +101,7 @@ class Quantization(Effect):
     )
     search = Hooked(_Search)
     fit = Hooked(_Fit)
+    twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
         step = self.number('step')

@@ -56,6 +56,8 @@ class Discrepancy:
     peaks: Array = field(default_factory=lambda: np.zeros(0))
     """By how much each stretch of the recordings was off at its worst, beyond what chance makes of
     what is usually left there, shape (K,) [m]: a tool strays farther than a normal law has it."""
+    jumps: float = 0.0
+    """How many jumps of the model's laws the recordings showed: so well their places are known."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))

@@ -33,6 +33,7 @@ from .directions import Directions
 from .discrepancy import Discrepancy, Where
 from .domain import Domain
 from .features import Features, with_expected_effort
+from .jumps import jumps
 from .poses import Poses
 from .reversals import just_turned
 from .twin import Twin
@@ -46,10 +47,6 @@ ALIKE = 1.0
 cells it held as many paths as one shift all along, with intervals a fifth narrower; 0.3 held fewer."""
 WAVES = 256
 """Functions of posture that it is drawn from."""
-AMISS = 0.1
-"""Part of the jumps of a law that come a place sooner or later than a model has them. A judgement on
-three sealed cells: of 183 steps of an encoder four did, and the one slip. Below a twentieth, what is
-95 % sure would leave a slip out."""
 SEED = 0
 """Of the draws: every promise is made of the same models."""
 CHUNK = 2000
@@ -310,13 +307,14 @@ class Posterior:
             way = unit((count, 3))
             way *= (np.resize(rest.peaks, count) / np.linalg.norm(way, axis=1))[:, None]
             of_arm[place, np.arange(count)] += way
-        jumps = _jumps(features)
-        if jumps.any():
-            # Some come a place sooner or later.
-            amiss = rng.random((len(jumps), count, 1)) < AMISS
+        jumped = jumps(features)
+        if jumped.any():
+            # Some come a place sooner or later. All that were recorded fit: rule of succession.
+            share = rng.beta(1.0, 1.0 + rest.jumps, (count, 1))
+            amiss = rng.random((len(jumped), count, 1)) < share
             late = rng.random(amiss.shape) < 0.5
-            of_arm[:-1] += (amiss & ~late) * jumps[:, None]
-            of_arm[1:] -= (amiss & late) * jumps[:, None]
+            of_arm[:-1] += (amiss & ~late) * jumped[:, None]
+            of_arm[1:] -= (amiss & late) * jumped[:, None]
         of_frames = np.tensordot(columns[:frames], steps[:, :frames], axes=(0, 1))
         off = np.stack([of_arm + of_frames.transpose(1, 2, 0), of_arm], axis=1)
         return off * rest.grown(here)[:, None, None, None]
@@ -378,21 +376,6 @@ def _bends(q: Array) -> Array:
     slopes = rng.standard_normal((q.shape[1], WAVES)) / ALIKE
     phase = rng.uniform(0.0, 2.0 * np.pi, WAVES)
     return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(q @ slopes + phase))
-
-
-def _jumps(features: Features) -> Array:
-    """
-    Return by how much effects jump from each place of a motion to the next, shape (M - 1, 3) [m].
-
-    An encoder's steps and slips jump at places that recordings show to a sample at best, and no
-    derivative of a model says so. What is corrected a sample early or late is off by all of the jump.
-    """
-    recording, at, robot = features.recording, features.at, features.twin.robot
-    jumping = [e for e in features.twin.effects if e.traits.jumps]
-    if not jumping or recording.joints.static or at.size < 2:
-        return np.zeros((0, 3))
-    jumped, bare = (Twin(robot, each).poses(recording, at).position for each in (jumping, ()))
-    return np.asarray(np.diff(jumped - bare, axis=0))
 
 
 class Drawn(NamedTuple):
@@ -523,6 +506,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
             'reach': rest.reach,
             'turns': np.asarray(rest.turns).tolist(),
             'peaks_m': rest.peaks.tolist(),
+            'jumps': rest.jumps,
         },
         'middle': posterior.middle,
         'recorded': posterior.domain.as_dict(),

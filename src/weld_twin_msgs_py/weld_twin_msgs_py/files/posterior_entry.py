@@ -57,6 +57,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         max(_size(rest['reach'], 'reach'), 1e-9),
         readonly(rest.get('turns', np.zeros(robot.n)), (robot.n,), 'posterior.discrepancy.turns'),
         readonly(rest.get('peaks_m', ()), (None,), 'posterior.discrepancy.peaks_m'),
+        _size(rest.get('jumps', 0.0), 'jumps'),
     )
     return Posterior(
         what,

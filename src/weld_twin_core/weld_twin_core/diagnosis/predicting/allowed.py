@@ -33,6 +33,7 @@ from ...effects.dated import of_the_robot
 from ...recording import Recording
 from ...twin.directions import Directions
 from ...twin.domain import Domain
+from ...twin.jumps import shown
 from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
@@ -86,6 +87,7 @@ def allowed(
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
     recordings = problem.recordings
+    jumps = sum(shown(f, max(scale.position, LEAST)) for f in problem.features(model))
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
     what = _directions(problem, model)
     prior = _prior(what, model)
@@ -105,7 +107,7 @@ def allowed(
         what,
         models.mean,
         spread,
-        plausible_arm.discrepancy(model.robot, remaining, fine, model.found),
+        replace(plausible_arm.discrepancy(model.robot, remaining, fine, model.found), jumps=jumps),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
         prior_std=prior.width,

@@ -20,6 +20,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.directions import Directions
 from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.goal_correction import Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal
 from weld_twin_core.twin.posterior import Posterior, pose_covariances
@@ -100,6 +101,53 @@ def test_a_joint_that_shakes_is_not_taken_for_the_noise_of_the_instrument():
     assert np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) < 2.0 * np.sqrt(
         (error**2).sum(axis=1).mean()
     )
+
+
+def stopping(rng, gives):
+    """
+    Return stamps, a motion whose speed changes every second, and where a spring has the second joint.
+
+    A mass on a spring of 12 Hz follows the joint, which it holds back as far as ``gives`` says.
+    """
+    fine, each = np.arange(0.0, 40.0, 1e-3), rng.uniform(-0.4, 0.4, (40, 6))
+    speed = np.repeat(each - each.mean(axis=0), 1000, axis=0)
+    ramp = np.ones(80) / 80.0  # a speed is reached in eight hundredths of a second
+    speed = np.stack([np.convolve(v, ramp, 'same') for v in speed.T], axis=1)
+    q = HOME + np.cumsum(speed, axis=0) * 1e-3
+    pull, off, swing = np.gradient(speed[:, 1], 1e-3), np.zeros(fine.size), 0.0
+    turn = 2.0 * np.pi * 12.0
+    for k in range(1, fine.size):
+        swing += 1e-3 * (-gives * turn**2 * pull[k] - turn**2 * off[k - 1] - 0.2 * turn * swing)
+        off[k] = off[k - 1] + 1e-3 * swing
+    real = q.copy()
+    real[:, 1] += off
+    return fine[::20], q[::20], real[::20]
+
+
+def test_a_tool_that_swings_is_less_sure_where_joints_were_just_accelerated():
+    robot, rng = load('ur5'), np.random.default_rng(11)
+    zero = effect_from_mapping(
+        {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 0.0}
+    )
+    t, q, real = stopping(rng, 6e-5)
+    assert allowed(*fitted(robot, t, q, q, zero, rng)).discrepancy.swings == 0.0
+    made = fitted(robot, t, q, real, zero, rng)
+    posterior = allowed(*made)
+    assert 6e-6 < posterior.discrepancy.swings < 6e-5
+    # How far it strays on another motion is told, and where no joint changes its speed it does not.
+    t, q, real = stopping(rng, 6e-5)
+    twin, seen = made[1].twin(0), Recording('again', JointMotion(t, q))
+    off = np.linalg.norm(forward(robot, real)[:, :3, 3] - twin.poses(seen).position, axis=1)
+    features = Features(twin, seen, t)
+    silent = replace(posterior, discrepancy=replace(posterior.discrepancy, swings=0.0))
+    told, untold = (
+        np.linalg.norm(each.drawn(features)[:, 0], axis=2) for each in (posterior, silent)
+    )
+    assert off.max() < np.quantile(told.max(axis=0), 0.95) < 1.5 * off.max()
+    still = features.shaken.max(axis=1) < 0.2
+    assert 0.2 < still.mean() < 0.9
+    np.testing.assert_allclose(told[still].mean(), untold[still].mean(), rtol=0.05)
+    assert np.median(told[~still]) > 1.3 * np.median(untold[~still])
 
 
 def test_white_noise_hides_less_of_an_arm_than_chance_might():

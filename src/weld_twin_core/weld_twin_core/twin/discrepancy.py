@@ -32,6 +32,8 @@ class Where(NamedTuple):
     """What else was not recorded, as `Domain.unlike` has it, shape (M,)."""
     turned: NDArray[np.bool_]
     """Joints that have just turned around, shape (M, n)."""
+    shaken: Array
+    """How hard joints were accelerated just before, shape (M, n) [rad/s^2 or m/s^2]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,9 @@ class Discrepancy:
     what is usually left there, shape (K,) [m]: a tool strays farther than a normal law has it."""
     jumps: float = 0.0
     """How many jumps of the model's laws the recordings showed: so well their places are known."""
+    swings: float = 0.0
+    """How far every joint may be off where it was just accelerated, for its acceleration [s^2]: arms
+    swing on springs that no law of the model has."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
@@ -68,7 +73,8 @@ class Discrepancy:
 
     def covariance(self, here: Where) -> Array:
         """Return its part of the covariance where it was recorded, shape (M, 6, 6)."""
-        moved = here.levers * self.joints(here)[:, None]
+        each = np.hypot(self.joints(here), self.swung(here))
+        moved = here.levers * each[:, None]
         out = np.einsum('nim,njm->mij', moved, moved)
         out[:, np.arange(6), np.arange(6)] += np.repeat([self.position, self.orientation], 3) ** 2
         return np.asarray(out)
@@ -79,6 +85,10 @@ class Discrepancy:
         beyond = np.minimum(here.beyond.T / self.reach, 1.0)
         parts = self.gears[:, None], self.curves[:, None] * beyond, (here.turned * self.turns).T
         return np.asarray(np.sqrt(sum(part**2 for part in parts)))
+
+    def swung(self, here: Where) -> Array:
+        """Return the standard deviation of what swings in every joint, shape (n, M) [rad or m]."""
+        return np.asarray(self.swings * here.shaken.T)
 
     def grown(self, here: Where) -> Array:
         """Return how many times as large all is, up to `ELSEWHERE` where nothing was recorded, (M,)."""

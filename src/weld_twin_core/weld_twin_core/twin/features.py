@@ -27,6 +27,9 @@ from .twin import Twin
 SLOW = 0.03
 """Half of the time [s] over which a joint's acceleration is taken: a spring that swings at 10 to 50 Hz
 follows no faster, and neither a corner of a program nor an encoder's noise is an acceleration."""
+RINGS = 0.1
+"""Time [s] after an acceleration in which the tool still swings: that of one to five swings at 10 to 50
+Hz, which damp by and by."""
 Remembered = tuple[bytes, str, bytes]
 """Instants looked at, effect and its parameters to the last digit."""
 
@@ -82,7 +85,16 @@ class Features:
     @cached_property
     def acceleration(self) -> Array:
         """Return how springs see joints accelerated, shape (M, n) [rad/s^2, or m/s^2 of a slide]."""
-        motion, t = self.recording.joints, self.run.view.t
+        return self._accelerated(0.0)
+
+    @cached_property
+    def shaken(self) -> Array:
+        """Return the largest size of `acceleration` that a spring still rings of, shape (M, n)."""
+        lags = np.linspace(0.0, RINGS, 5)
+        return np.asarray(np.max([np.abs(self._accelerated(lag)) for lag in lags], axis=0))
+
+    def _accelerated(self, before: float) -> Array:
+        motion, t = self.recording.joints, self.run.view.t - before
         low, high = (np.clip(t + way, *motion.t[[0, -1]]) for way in (-SLOW, SLOW))
         span = (high - low)[:, None]
         change = motion.at(high)[1] - motion.at(low)[1]

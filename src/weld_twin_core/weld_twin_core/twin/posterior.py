@@ -301,6 +301,12 @@ class Posterior:
             + np.einsum('nim,nm,mdn->mdi', here.levers[:, :3], gears, joints, optimize=True)
             + rest.position * own
         )
+        if rest.swings:
+            # What swings has changed its way from one place to the next.
+            swung = unit((len(gears), count, len(bends)))
+            of_arm += np.einsum(
+                'nim,nm,ndm->mdi', here.levers[:, :3], rest.swung(here), swung, optimize=True
+            )
         if rest.peaks.size:
             # Each model strays at one place, as far as one of the stretches did.
             place = (bends @ unit((bends.shape[1], count))).argmax(axis=0)
@@ -351,7 +357,8 @@ class Posterior:
             turned = just_turned(recording.joints, at)
         beyond, margins = self.domain.beyond(q), np.array(self.domain.margins)
         unlike = self.domain.unlike(recording, at)
-        return Where(q, np.stack(joints), beyond, margins, unlike, turned)
+        shaken = features.shaken if self.discrepancy.swings else np.zeros(q.shape)
+        return Where(q, np.stack(joints), beyond, margins, unlike, turned, shaken)
 
 
 def _spread(moved: Array, rest: Array, grown: Array) -> Array:
@@ -507,6 +514,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
             'turns': np.asarray(rest.turns).tolist(),
             'peaks_m': rest.peaks.tolist(),
             'jumps': rest.jumps,
+            'swings': rest.swings,
         },
         'middle': posterior.middle,
         'recorded': posterior.domain.as_dict(),

@@ -58,6 +58,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         readonly(rest.get('turns', np.zeros(robot.n)), (robot.n,), 'posterior.discrepancy.turns'),
         readonly(rest.get('peaks_m', ()), (None,), 'posterior.discrepancy.peaks_m'),
         _size(rest.get('jumps', 0.0), 'jumps'),
+        _size(rest.get('swings', 0.0), 'swings'),
     )
     return Posterior(
         what,

@@ -99,7 +99,8 @@ def allowed(
     levers, parts = _levers(problem, model, scale), rows.parts(regions.labels)
     spread = models.covariance * _dispersed(problem, rows, prior, models, parts)
     whole, turning = (models.mean, spread), ~np.asarray(model.robot.prismatic)
-    predicted = Predicted.of(regions, rows.columns, parts, levers, system.given, whole)
+    shaken = np.concatenate([maker.shaken for maker in problem.features(model)])
+    predicted = Predicted.of(regions, rows.columns, parts, levers, shaken, system.given, whole)
     noise, rough = known_noise(problem, floor), 1.0 if nameless else models.rough
     remaining = leftover(problem, predicted, turning, noise, rough, _lost(problem, model))
     fine = _uneven(models.open, what)
@@ -107,7 +108,7 @@ def allowed(
         what,
         models.mean,
         spread,
-        replace(plausible_arm.discrepancy(model.robot, remaining, fine, model.found), jumps=jumps),
+        plausible_arm.discrepancy(model.robot, remaining, fine, jumps, model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
         prior_std=prior.width,

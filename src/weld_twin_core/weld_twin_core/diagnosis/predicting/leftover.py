@@ -88,6 +88,8 @@ class Predicted:
     (R, N, 3) of points."""
     levers: Array
     """d pose / d joint, shape (n, N, 6)."""
+    shaken: Array
+    """How hard joints were accelerated just before, shape (N, n) [rad/s^2 or m/s^2]."""
     seen: NDArray[np.bool_]
     """Rows that a sample has, shape (N, 6)."""
     region: NDArray[np.int_]
@@ -109,6 +111,7 @@ class Predicted:
         columns: Array,
         parts: Sequence[Products],
         levers: Array,
+        shaken: Array,
         given: Given,
         whole: tuple[Array, Array],
     ) -> Predicted:
@@ -117,6 +120,7 @@ class Predicted:
 
         unseen: of the fitted model, with regions of posture left out in turn.
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
+        shaken: as the field.
         parts: the columns' products in every region.
         whole: mean and covariance of the coordinates given all rows.
         """
@@ -142,6 +146,7 @@ class Predicted:
             by_sample(error),
             by_sample(ways, wide),
             by_sample(levers),
+            shaken,
             seen,
             labels[np.flatnonzero(place[1] == 0)].astype(int),
             good,
@@ -150,11 +155,16 @@ class Predicted:
             by_sample(own, wide),
         )
 
-    def axes(self, part: slice) -> tuple[Array, Array, Array]:
-        """Return errors (K, c), moments (K, c, c) and levers (K, c, n) of samples that have rows."""
+    def axes(self, part: slice, swings: float) -> tuple[Array, Array, Array]:
+        """
+        Return errors (K, c), moments (K, c, c) and levers (K, c, n) of samples that have rows.
+
+        swings: as a discrepancy has it; what swings is accounted for.
+        """
         some = self.good & self.seen[:, part].all(axis=1)
         left, levers = self.left[some, part], self.levers[:, some, part]
-        moments = np.zeros((*left.shape, left.shape[1]))
+        moved = levers.transpose(1, 2, 0) * (swings * self.shaken[some])[:, None]
+        moments = np.einsum('kin,kjn->kij', moved, moved)
         if self.at_rest:
             own = self.own[:, some, part]
             moments = np.einsum('rki,rkj->kij', own, own, optimize=True)
@@ -186,7 +196,7 @@ class Rest(NamedTuple):
 
     ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
     on top of that. ``peaks``, shape (K,) [m], is how far each region was off at its worst, beyond
-    chance.
+    chance. ``swings`` [s^2] is how far joints are off for how hard they were just accelerated.
     """
 
     position: float
@@ -194,6 +204,7 @@ class Rest(NamedTuple):
     gears: Array
     turns: Array
     peaks: Array
+    swings: float
 
 
 def leftover(
@@ -213,14 +224,15 @@ def leftover(
     rough: share of the arm's small errors that are of a usual size.
     lost: how much motion was found to be lost in every joint, shape (n,) [rad or m].
     """
+    swings = _swings(predicted)
     if predicted.seen[:, :3].all(axis=1).any():
-        spread = _shared(*predicted.axes(slice(0, 3)), turning)
+        spread = _shared(*predicted.axes(slice(0, 3), swings), turning)
     else:
         # Faces and lengths show one way each: nothing parts what is left by axes or gears.
-        error, moment, _ = predicted.axes(slice(0, 1))
+        error, moment, _ = predicted.axes(slice(0, 1), swings)
         remaining = max(float((error**2).mean() - moment.mean()), 0.0)
         spread = Spread(float(np.sqrt(remaining)), np.zeros(lost.size), False)
-    error, moment, lever = predicted.axes(slice(3, 6))
+    error, moment, lever = predicted.axes(slice(3, 6), swings)
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     orientation = spread.position
     if error.size:
@@ -237,7 +249,30 @@ def leftover(
         at_turns,
         # An instrument strays as well, and no more of that is the arm's than of the rest.
         _peaks(predicted) * of_gears,
+        swings,
     )
+
+
+def _swings(predicted: Predicted) -> float:
+    """
+    Return how far joints are off for how hard they were just accelerated [s^2].
+
+    An arm swings on springs that no law of the model has, where it starts, stops and turns a corner, and
+    errs little in between. What samples leave is held against how far a joint's swing would move the
+    tool there: the slope is the variance. What the middle of the models followed is no less of the arm.
+    """
+    use = predicted.good & predicted.seen[:, :3].all(axis=1)
+    moved = predicted.levers[:, use, :3] * predicted.shaken[use].T[:, :, None]
+    far = (moved**2).sum(axis=0).mean(axis=1)
+    if predicted.at_rest or not far.any():
+        return 0.0
+    own = predicted.own[:, use, :3]
+    left = (predicted.left[use, :3] ** 2 + np.einsum('rki,rki->ki', own, own)).mean(axis=1)
+    apart = far - far.mean()
+    slope = float(apart @ left / (apart @ apart))
+    rest = left - left.mean() - slope * apart
+    chance = float(np.sqrt(apart**2 @ rest**2) / (apart @ apart))
+    return float(np.sqrt(slope)) if slope > AGREED * chance else 0.0
 
 
 def _peaks(predicted: Predicted) -> Array:

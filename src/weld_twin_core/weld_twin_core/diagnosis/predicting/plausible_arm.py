@@ -152,12 +152,15 @@ def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
     )
 
 
-def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect]) -> Discrepancy:
+def discrepancy(
+    robot: Robot, rest: Rest, fine: Array, jumps: float, result: Sequence[Effect]
+) -> Discrepancy:
     """
     Return what no parameter explains, with gears as uneven where they were not seen.
 
     rest: what is left over where it was recorded.
     fine: height of every joint's fine curve, shape (n,).
+    jumps: how many the recordings showed.
     result: a curve without a formula among them says nothing beyond its ends, so that the joint
     may be off by as much as that there.
     """
@@ -175,4 +178,6 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect])
         SPACING,
         rest.turns,
         rest.peaks,
+        jumps,
+        rest.swings,
     )

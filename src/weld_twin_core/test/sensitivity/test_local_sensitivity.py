@@ -17,12 +17,14 @@ from weld_twin_core.sensitivity import (
     posture,
 )
 
-# A bearing's lean is nothing on a wrist that stands at a right angle, and has no slope to compare.
+# A bearing's lean is nothing on a wrist that stands at a right angle, nor is what a tool sags by an axis
+# that stays level: neither has a slope to compare.
 POINTWISE = tuple(
     name
     for name, kind in REGISTRY.items()
     if kind.stage in (Stage.JOINT, Stage.ELASTIC, Stage.LINK, Stage.POSE)
-    and name not in ('quantization', 'joint_coupling', 'thermal_growth', 'bearing_tilt')
+    and name
+    not in ('quantization', 'joint_coupling', 'thermal_growth', 'bearing_tilt', 'tool_sag')
     and not kind.needs
     and name not in ('root_pose', 'guide_bend', 'guide_tilt')  # of other robots than these arms
     and all(p.lower < 0.0 for p in kind.parameters)  # else a nominal arm has no other side

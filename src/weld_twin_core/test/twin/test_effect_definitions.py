@@ -42,6 +42,7 @@ class Cell:
 
 SMALL = np.array([1e-3, -2e-3, 3e-3])
 TURN = np.array([0.1, 0.2, -0.3])
+SAG = 1e-3 * np.array([1.0, -2.0, 3.0, 0.5, 4.0, -1.0, 2.5, -3.0, 1.5])
 
 
 def joint_offset(cell):
@@ -244,6 +245,47 @@ def pedestal_tilt(cell):
         cell.base = leaned
 
 
+def weights_behind(cell, joint):
+    """Return the moment of what a joint carries, about its origin, in the axes that it leans about."""
+    robot, pose = cell.robot, np.eye(4)
+    rows = cell.textbook.rows(robot, cell.q)
+    force, twist = cell.wrench[:3], cell.wrench[3:]
+    ends = [pose := pose @ rows[k] for k in range(robot.behind, robot.n)]
+    before, end = ends[joint - 1 - robot.behind], np.eye(4)
+    if robot.convention == 'standard':  # the end of the row before, without its turn about y
+        end[:3, :3] = Rotation.from_rotvec([0.0, -robot.beta[joint - 1], 0.0]).as_matrix()
+    else:
+        end[:3, :3] = Rotation.from_rotvec([robot.alpha[joint], 0.0, 0.0]).as_matrix()
+        along = Rotation.from_rotvec([0.0, robot.beta[joint], 0.0]).as_matrix()[:, 0]
+        end[:3, 3] = robot.a[joint] * end[:3, :3] @ along
+    before = before @ end
+    tool = pose @ robot.T_flange_tool
+    weights = [
+        ((ends[k - robot.behind] @ [*robot.com[k], 1.0])[:3], robot.mass[k])
+        for k in range(joint, robot.n)
+    ]
+    weights.append(((tool @ [*robot.payload_com, 1.0])[:3], robot.payload_mass))
+    moment = sum(np.cross(at - before[:3, 3], mass * robot.gravity) for at, mass in weights)
+    pull = np.cross(tool[:3, 3] - before[:3, 3], tool[:3, :3] @ force)
+    return before[:3, :3].T @ (moment + pull + tool[:3, :3] @ twist)
+
+
+def axis_compliance(cell):
+    """Two levers at a time: every weight and the wrench about the origin of joint 3."""
+    x, y, _ = 1e-5 * weights_behind(cell, 3)
+    row = 2 if cell.robot.convention == 'standard' else 3
+    cell.table = {('alpha', row): x, ('beta', row): y}
+
+
+def tool_sag(cell):
+    turn = np.eye(3)
+    for row in cell.textbook.rows(cell.robot, cell.q)[cell.robot.behind :]:
+        turn = turn @ row[:3, :3]
+    down = turn.T @ cell.robot.gravity / np.linalg.norm(cell.robot.gravity)
+    sag, lean = SAG.reshape(3, 3) @ down, 10.0 * SAG[::-1].reshape(3, 3) @ down
+    cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, sag, lean, 'right')
+
+
 def hose_pull(cell):
     """Virtual work: the joint turns a little, and the energy of a spring and a weight changes."""
 
@@ -333,6 +375,8 @@ DEFINITIONS = {
     'wear': ({'rate': 1e-3, 'slowing': 0.3}, wear),
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'pedestal_tilt': ({'compliance': [1e-5, 3e-5]}, pedestal_tilt),
+    'axis_compliance': ({'joint': 'j3', 'compliance': 1e-5}, axis_compliance),
+    'tool_sag': ({'sag': SAG, 'turn': 10.0 * SAG[::-1]}, tool_sag),
     'hose_pull': ({'force': [10.0, -20.0, 30.0], 'stiffness': 40.0}, hose_pull),
     'refraction': (
         {'warming': [100.0, -200.0, 300.0], 'instrument': [-4.0, 1.0, 0.0]},

@@ -220,6 +220,17 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
     return slope
 
 
+def joint_moment(
+    robot: Robot, chain: Frames, i: int, wrench: Array | None = None, frame: str = 'tool'
+) -> Array:
+    """Return the moment of what a joint of the robot carries about its origin, (3, ...) [N m]."""
+    moment: Array = cross(_loads(robot, chain)[i][1], _gravity_direction(robot, chain))
+    if wrench is not None:
+        force, own = _wrench_in_world(robot, chain, wrench, frame)
+        moment = moment + own + cross(components(chain.position) - chain.rows[i].z_point, force)
+    return moment
+
+
 def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
     """Return a point (3,) of link i's DH frame, at its far end, in the world, (3, ...) [m]."""
     if i + 1 == robot.n:

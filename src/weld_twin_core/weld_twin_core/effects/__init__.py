@@ -20,6 +20,7 @@ Examples
 from importlib import import_module
 from pkgutil import iter_modules
 
+from .axis_compliance import AxisCompliance as AxisCompliance
 from .backlash import Backlash as Backlash
 from .backlash import LoadedPlay as LoadedPlay
 from .backlash import Stiffening as Stiffening
@@ -68,6 +69,7 @@ from .registry import register as register
 from .servo_lag import ServoLag as ServoLag
 from .thermal import LinkWarmUp as LinkWarmUp
 from .thermal import ThermalGrowth as ThermalGrowth
+from .tool_sag import ToolSag as ToolSag
 from .transmission_ripple import TransmissionRipple as TransmissionRipple
 from .vibration import Vibration as Vibration
 from .view import Parameter as Parameter

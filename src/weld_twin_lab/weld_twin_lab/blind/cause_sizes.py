@@ -38,7 +38,11 @@ LEAST = {'servo_lag': 0.15, 'joint_compliance': 0.1}
 """The same for causes that the simulator cannot have any smaller: a servo or spring too stiff."""
 INSIDE = 0.8
 """Share of what a machine can have up to which causes are drawn: the estimate may be higher."""
-TWINS = {('bearing_tilt', 'tilt'): 'lean', ('hose_pull', 'tension'): 'force'}
+TWINS = {
+    ('bearing_tilt', 'tilt'): 'lean',
+    ('hose_pull', 'tension'): 'force',
+    ('tool_sag', 'bend'): 'turn',
+}
 """What the twin calls the size of a cause, where it is another word."""
 LONG = 0.1
 """Length [m] from which the growth of a link shows."""
@@ -229,6 +233,11 @@ def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'hook': [reach * float(x) for x in hook], 'tension': 15.0, 'length': reach}
 
 
+def _sag(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    """Return a torch that stands aside of its bracket, as most do."""
+    return {'bend': 1e-3, 'lever': [*rng.uniform(-0.1, 0.1, 2), float(rng.uniform(0.15, 0.35))]}
+
+
 def _quadratic(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'coefficient': 3e-4, 'origin': _vector(float(rng.uniform(0.0, 1.0)), rng)}
 
@@ -287,6 +296,7 @@ CAUSES: dict[str, Typical] = {
     'wear': Typical(_wear, ('rate',), signed=True),
     'pedestal_tilt': Typical(_pedestal, ('compliance',)),
     'hose_pull': Typical(_hose, ('tension',)),
+    'tool_sag': Typical(_sag, ('bend',)),
     'refraction': _turned('warming', 2.0),
     'gear_ratio_by_direction': _one('difference', 1e-3, signed=True),
     'clock_rate': _whole('rate', 2e-5, signed=True, moving=True),

@@ -413,6 +413,38 @@ def test_a_smooth_motion_measured_at_every_joint_state_is_not_static(tmp_path, r
     assert not read_recording(tmp_path / 'alone.mcap', robot).joints.static
 
 
+@pytest.mark.parametrize('every', [1, 12, 150])
+def test_joint_states_of_two_arms_in_turn_are_refused_and_a_garbled_one_is_not(
+    every, tmp_path, robot
+):
+    # The second stands at zero, and tells so a millisecond after every so many of the first.
+    t = np.arange(200) * 0.01
+    q = np.stack([1.0 + np.sin(t), np.cos(t)], axis=1)
+    both = np.concatenate([t, t[every - 1 :: every] + 1e-3])
+    order = np.argsort(both)
+    other = np.concatenate([q, np.zeros((both.size - t.size, 2))])
+    motion = JointMotion(both[order], other[order])
+    mixed = Recording('mixed', motion, Measurements(t, np.ones((200, 3))))
+    write_recording(tmp_path / 'bag', mixed, robot)
+    alone = shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
+    if every == 150:
+        assert read_recording(alone, robot).joints.t.size == 201
+    else:
+        with pytest.raises(DataError, match='two publishers share'):
+            read_recording(alone, robot)
+
+
+@pytest.mark.parametrize('lap', [2, 3])
+def test_stations_with_home_between_them_are_no_two_arms(lap, tmp_path, robot):
+    still = stations(0.02)
+    q = still.joints.q.copy()
+    q[::lap] = 0.5
+    home = replace(still, joints=JointMotion(still.joints.t, q))
+    write_recording(tmp_path / 'bag', home, robot)
+    shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
+    assert read_recording(tmp_path / 'alone.mcap', robot).joints.static
+
+
 def test_what_the_writer_knew_about_stations_is_believed(tmp_path, robot):
     known = replace(stations(1.0), measured=None)
     known = replace(known, joints=replace(known.joints, static=True))

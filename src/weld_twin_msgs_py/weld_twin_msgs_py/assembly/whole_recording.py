@@ -31,6 +31,13 @@ FAST = 10.0
 """Speed [rad/s or m/s] no arm reaches, for robots whose limits are not known."""
 
 
+JUMP = 0.1
+"""Joint states nearer than this [rad or m] may be late ones of the same arm."""
+NEAR = 0.2
+"""Share of such a jump from which it came back: each of two arms moves on little between two states."""
+STRAY = 2
+"""Joint states that a driver may garble."""
+TURN = 2.0 * np.pi
 AT_REST = 0.01
 """Speed [rad/s or m/s] that controllers still tell of an arm that stands."""
 TOGETHER = 0.1
@@ -59,8 +66,39 @@ def looks_static(robot: Robot, motion: JointMotion, measured: Measurements | Non
         steps, speeds = steps[goes], speeds[goes]
     if np.median(steps) >= SPARSE:
         return True
-    limit = np.where(np.isfinite(robot.max_velocity), robot.max_velocity, FAST)
-    return bool((speeds > 1.5 * limit).any(axis=1).mean() > 0.5)
+    return bool((speeds > _fastest(robot)).any(axis=1).mean() > 0.5)
+
+
+def _fastest(robot: Robot) -> Array:
+    """Return speeds that no joint of a robot reaches, shape (n,) [rad/s or m/s]."""
+    return 1.5 * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, FAST)
+
+
+def _refuse_two_arms(name: str, robot: Robot, motion: JointMotion, *, stations: bool) -> None:
+    """
+    Refuse joint states of two arms in turn, or of an arm and of a publisher that makes them up.
+
+    They jump farther than the arm can by then, and at once back to near where they came from:
+    every other jump or more. Of stations whose stamps mean nothing, nearly all must: an arm may go
+    home between any two.
+    """
+
+    def away(start: np.ndarray, stop: np.ndarray) -> Array:
+        way = motion.q[stop] - motion.q[start]
+        return np.asarray(abs(way - np.where(robot.prismatic, 0.0, TURN * np.round(way / TURN))))
+
+    every, steps = np.arange(motion.t.size), np.diff(motion.t)[:, None]
+    way = away(every[:-1], every[1:])
+    jumps = np.flatnonzero((way > np.maximum(_fastest(robot) * steps, JUMP)).any(axis=1))
+    first, last = jumps[:-1], jumps[1:] + 1
+    near = away(first, last).max(axis=1) < NEAR * way[first].max(axis=1)
+    back = int((near & (motion.t[last] - motion.t[first] < SPARSE)).sum())
+    if back > max(STRAY, (0.9 if stations else 0.4) * first.size):
+        raise DataError(
+            f'the joint states of {name} jump to another posture and back {back} times, faster than '
+            'the arm moves: two publishers share their topic, such as those of two arms, or a '
+            'joint_state_publisher beside the driver; end one of them, or give each its topic'
+        )
 
 
 def _once_each(motion: JointMotion, measured: Measurements) -> bool:
@@ -119,8 +157,10 @@ def assembled(
     motion, effort = _motion(robot, streams[Role.JOINTS])
     measured, more = _measurements(streams, epoch)
     notes += more
-    if static is None:
-        static = looks_static(robot, motion, measured)
+    if not static:
+        whole = looks_static(robot, motion, measured)
+        _refuse_two_arms(name, robot, motion, stations=whole)
+        static = whole if static is None else static
     if static:
         motion = JointMotion(motion.t, motion.q, static=True)
         notes += (f'{motion.t.size} static stations: the motion between them is not known',)

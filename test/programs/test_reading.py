@@ -430,6 +430,7 @@ TP_TAIL = (
         ('fanuc-ls', [TP_ON, 'IF DI[1]=ON,JMP LBL[1]', TP_OFF, 'LBL[1]', TP_MOVE], [False]),
         ('fanuc-ls', [TP_ON, TP_OFF, TP_MOVE], [True]),
         ('fanuc-ls', ['LBL[1:up]', TP_MOVE], [True]),
+        ('fanuc-ls', ['L @P[1] 9mm/sec FINE'], [True]),
         ('inform', [JOB_ON, 'IFTHENEXP I001=1', JOB_OFF, 'ENDIF', JOB_MOVE], [False]),
         ('inform', [JOB_ON, 'JUMP *A IF IN#(1)=ON', JOB_OFF, '*A', JOB_MOVE], [False]),
         ('inform', [JOB_ON, JOB_OFF, JOB_MOVE], [True]),

@@ -37,7 +37,6 @@ NEAR = 0.2
 """Share of such a jump from which it came back: each of two arms moves on little between two states."""
 STRAY = 2
 """Joint states that a driver may garble."""
-TURN = 2.0 * np.pi
 AT_REST = 0.01
 """Speed [rad/s or m/s] that controllers still tell of an arm that stands."""
 TOGETHER = 0.1
@@ -85,7 +84,8 @@ def _refuse_two_arms(name: str, robot: Robot, motion: JointMotion, *, stations: 
 
     def away(start: np.ndarray, stop: np.ndarray) -> Array:
         way = motion.q[stop] - motion.q[start]
-        return np.asarray(abs(way - np.where(robot.prismatic, 0.0, TURN * np.round(way / TURN))))
+        turns = np.round(way / (2.0 * np.pi))
+        return np.asarray(abs(way - np.where(robot.prismatic, 0.0, 2.0 * np.pi * turns)))
 
     every, steps = np.arange(motion.t.size), np.diff(motion.t)[:, None]
     way = away(every[:-1], every[1:])

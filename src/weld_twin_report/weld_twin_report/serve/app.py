@@ -22,6 +22,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from weld_twin_core.errors import DataError, TwinError
+from weld_twin_nodes.offline.corrected_before import holds, twice
 
 from ..fleet.cell_page import page_of
 from ..fleet.ranking_page import ranking_page
@@ -32,7 +33,7 @@ from . import pages
 from .access import Access, Doors, People, be, be_nobody
 from .directory import NO_ROOM, NoRoom, is_full, refuse_full
 from .fields import sentence
-from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job
+from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job, main_file
 from .queue import HISTORY, UNKNOWN, Queue
 from .settings import Settings
 from .uploads import Busy, TooMuch, TooSlow, asked_of, asked_of_program, save, save_program
@@ -116,9 +117,11 @@ class _Site:
             robot = self._model_of(request, form, beside)
             if not (beside / DIAGNOSIS).is_file():
                 raise DataError('choose the diagnosis that it is to be corrected by, or drop one')
+            job = replace(job, names=names)
+            self._refuse_corrected(job)
             asked_form = {**form, 'robot': robot or form.get('robot', '')}
             asked = asked_of_program(asked_form, sorted(file.name for file in beside.iterdir()))
-            await run_in_threadpool(self._queue.add, replace(job, names=names).ask(asked))
+            await run_in_threadpool(self._queue.add, job.ask(asked))
         return RedirectResponse(f'/recordings/{job.key}', 303)
 
     @asynccontextmanager
@@ -136,6 +139,14 @@ class _Site:
         except BaseException:
             shutil.rmtree(self._queue.folder(job), ignore_errors=True)
             raise
+
+    def _refuse_corrected(self, job: Job) -> None:
+        """Refuse a program that an earlier correction of the same user wrote."""
+        place = job.uploads(self._queue.folder(job))
+        texts = [(place / name).read_bytes() for name in job.names]
+        for before in self._queue.of(job.user):
+            if before.kind == PROGRAM and holds(self._queue.folder(before) / FOUND, texts):
+                raise twice(main_file(job.names), 'when you dropped it before')
 
     def _party(self, request: Request) -> str:
         """Return with whom somebody shares what may wait; empty for nobody."""

@@ -9,18 +9,17 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.program_correction import Caps
 from weld_twin_msgs_py.bags import provenance
-from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
 from weld_twin_msgs_py.programs.languages import language_of
 from weld_twin_msgs_py.programs.source import read_source
 from weld_twin_nodes.cli.given import Given, inputs_of, quantity, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
+from weld_twin_nodes.offline.corrected_before import RESULT, holds, moved, twice
 from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
 
 from . import OF_PROGRAM
 
-RESULT = 'correction.json'
 CAPS = '--max-correction'
 NOISE = '0.03mm'
 """Of a measured coordinate unless given: a tracker or a measuring arm."""
@@ -43,36 +42,19 @@ def run(given: Given) -> int:
 
 
 def _refuse_corrected(program: Path) -> None:
-    """Refuse a program that a correction wrote: its points would be moved a second time."""
-    if _moved(program.resolve().parent) == program.name:
-        raise _twice(program, f"as '{RESULT}' beside it says")
+    """Refuse a program that lies where a correction wrote it."""
+    if moved(program.resolve().parent) == program.name:
+        raise twice(program, f"as '{RESULT}' beside it says")
 
 
 def _refuse_written(program: Program, given: Given) -> None:
-    """Refuse a program that is what the folder of the result holds, from wherever it came back."""
-    out, texts = Path(given.out), {source.name: source.text for source in program.sources}
-    if _moved(out) in texts and all((out / name).is_file() for name in texts):
-        kept = {name: (out / name).read_bytes().decode('latin-1') for name in texts}
-        if kept == texts:
-            raise _twice(given.program, f"for '{out}' holds the same as corrected")
-
-
-def _moved(folder: Path) -> str | None:
-    """Return the name of the program of a folder whose points a correction moved; None for none."""
-    try:
-        content = read_json(folder / RESULT)
-    except DataError:
-        return None
-    moves = content.get('moves', ())
-    moved = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
-    return content.get('program') if moved else None
-
-
-def _twice(program: Path | str, why: str) -> DataError:
-    return DataError(
-        f"'{program}' was corrected already, {why}, and would be corrected twice; give the program "
-        'as it was before'
-    )
+    """Refuse what the folder of the result holds, or one beside it, from wherever it came back."""
+    texts = [source.text.encode('latin-1') for source in program.sources]
+    out = Path(given.out)
+    beside = sorted(file.parent for file in out.absolute().parent.glob(f'*/{RESULT}'))
+    for folder in (out, *beside):
+        if holds(folder, texts):
+            raise twice(given.program, f"for '{folder}' holds the same as corrected")
 
 
 def _corrected_bag(given: Given) -> int:

@@ -68,7 +68,7 @@ class Parametric:
                 )
             if not np.isfinite(value).all():
                 raise ModelError(f'{self.name}: {parameter.name} is not finite')
-            if (value < parameter.lower).any() or (value > parameter.upper).any():
+            if value.size and not parameter.lower <= value.min() <= value.max() <= parameter.upper:
                 raise ModelError(
                     f'{self.name}: {parameter.name} = {value} {parameter.unit} is outside '
                     f'[{parameter.lower:g}, {parameter.upper:g}]'
@@ -76,8 +76,9 @@ class Parametric:
         self.__dict__['_sound'] = True
 
     def _is_number(self, parameter: Parameter) -> bool:
-        value = np.asarray(getattr(self, parameter.name))
-        return parameter.size == 1 or (parameter.size == 0 and value.ndim == 0)
+        if parameter.size:
+            return parameter.size == 1
+        return np.ndim(getattr(self, parameter.name)) == 0
 
     def components(self) -> list[tuple[Parameter, int | None]]:
         """Return every scalar component: its parameter and its index, None for a plain number."""
@@ -98,6 +99,8 @@ class Parametric:
     @cached_property
     def draws(self) -> tuple[int, ...]:
         """Return the draw axis of the parameters: (D,), or () for plain numbers."""
+        if all(isinstance(getattr(self, p.name), float) for p in self.parameters):
+            return ()
         return self.vector().shape[:-1]
 
     def vector(self) -> Array:
@@ -126,10 +129,12 @@ class Parametric:
         for parameter in self.parameters:
             number = self._is_number(parameter)
             count = 1 if number else np.shape(getattr(self, parameter.name))[-1]
-            part = wanted[..., at : at + count]
+            part: Any = wanted[..., at : at + count]
             # Draws of one number where a list is allowed stay draws of a list of one.
             plain = number and (parameter.size == 1 or wanted.ndim == 1)
-            values[parameter.name] = part[..., 0] if plain else part
+            if plain:  # a number of Python is looked at in a tenth of the time of an array of one
+                part = float(part[0]) if wanted.ndim == 1 else part[..., 0]
+            values[parameter.name] = part
             at += count
         return replace(self, **values)
 

@@ -101,7 +101,7 @@ def clearances(shape: _Body) -> Array:
         if abs(int(shape.link[i]) - int(shape.link[j])) < 2:
             continue
         gap = along[..., i, :, None, :] - along[..., j, None, :, :]
-        square = (gap**2).sum(axis=-1).min(axis=(-1, -2))
+        square = np.einsum('...i,...i->...', gap, gap).min(axis=(-1, -2))
         out.append(np.sqrt(square) - shape.radius[i] - shape.radius[j])
     empty = np.zeros((*shape.start.shape[:-2], 0))
     return np.stack(out, axis=-1) if out else empty

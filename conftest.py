@@ -35,6 +35,20 @@ settings.load_profile('any machine')
 gc.disable()
 
 
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection(session):
+    """Let one process collect before the others: what it compiles in a fresh clone, they only load."""
+    if 'PYTEST_XDIST_WORKER' in os.environ:
+        shared = Path(session.config.option.basetemp).parent
+        with open(shared / 'collected', 'a') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not os.fstat(lock.fileno()).st_size:
+                found = yield
+                lock.write('once')
+                return found
+    return (yield)
+
+
 def pytest_collection_finish():
     """Look for garbage from now on, only in what is made from now on, and as seldom as `weld-twin`."""
     from weld_twin_nodes.cli.main import GARBAGE
@@ -135,11 +149,13 @@ def pytest_xdist_make_scheduler(config, log):
     return ByFile(config, log)
 
 
-FEWER, FORGOTTEN = 24, 6
-"""Models that a diagnosis draws in tests, and those until the chain has forgotten its start: a quarter
-of what users get, so that what is named may not hang on how many are drawn."""
-STATIONS, PATHS = 24, 3
-"""Stations and paths that the next measurement is chosen from in tests: a third of what users get."""
+SMALLER = {
+    'predicting.sizes': {'SWEEPS': 12, 'LEARNING': 3, 'KEPT': 10},
+    'predicting.leftover': {'MOST': 100},
+    'advice.candidates': {'STATIONS': 24, 'PATHS': 3},
+}
+"""How many models are drawn in tests and samples looked at, by rooms of the diagnosis: an eighth of what
+users get, so that what is named may not hang on it; stations and paths to choose from are a third."""
 DRAWN = 'drawn'
 """Mark of files that are about what is drawn or proposed, or run what users run from end to end."""
 
@@ -147,7 +163,7 @@ DRAWN = 'drawn'
 @pytest.fixture(scope='module', autouse=True)
 def fewer_models(request):
     """
-    Let diagnoses draw fewer models in files without the mark `DRAWN`: a fifth of their time.
+    Let diagnoses draw fewer models in files without the mark `DRAWN`: a quarter of their time.
 
     The next measurement, another fifth, is chosen from fewer. Tests that leave out most kinds of
     causes do not look at these at all, which is half of their time; users' diagnoses still hold them
@@ -156,9 +172,7 @@ def fewer_models(request):
     if request.node.get_closest_marker(DRAWN) is not None:
         yield
         return
-    from weld_twin_core.diagnosis.advice import candidates
     from weld_twin_core.diagnosis.hypotheses import library, search
-    from weld_twin_core.diagnosis.predicting import sizes
 
     build, kinds = library.build, library.candidate_kinds
 
@@ -171,10 +185,9 @@ def fewer_models(request):
             return build(problem, model, scale, exclude)
 
     with pytest.MonkeyPatch.context() as changed:
-        changed.setattr(sizes, 'SWEEPS', FEWER)
-        changed.setattr(sizes, 'LEARNING', FORGOTTEN)
-        changed.setattr(candidates, 'STATIONS', STATIONS)
-        changed.setattr(candidates, 'PATHS', PATHS)
+        for room, sizes in SMALLER.items():
+            for name, size in sizes.items():
+                changed.setattr(f'weld_twin_core.diagnosis.{room}.{name}', size)
         changed.setattr(search, 'build', of_few)
         yield
 

@@ -41,10 +41,9 @@ def _with_middle_frames(robot, step):
     return robot.with_frames(base=base, tool=tool)
 
 
-@pytest.mark.parametrize(('arm', 'seed'), [('ur5', 11), ('kuka_kr6_r900', 12)])
-def test_a_corrected_arm_keeps_what_its_plan_promised(arm, seed):
+def test_a_corrected_arm_keeps_what_its_plan_promised():
     """Measured at the stations of the plan, corrected, and driven where it never was."""
-    robot, rng = catalog.load(arm), np.random.default_rng(seed)
+    robot, rng = catalog.load('ur5'), np.random.default_rng(11)
     flaws = small_errors(robot, rng)
 
     def driven(q, noise):

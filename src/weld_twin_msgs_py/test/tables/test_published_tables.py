@@ -13,8 +13,6 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_msgs_py.tables import read_table
 
-pytestmark = pytest.mark.drawn
-
 DATA = Path(__file__).parent / 'data'
 
 

@@ -269,7 +269,14 @@ class _Linker:
     def __call__(self, name: str, sources: list[Path], needs: list[Path]) -> Path:
         """Return the library; quick to make matters more than quick code."""
         out = self._site / name
-        objects = [self._object(source) for source in sources]
+        of_c = [source for source in sources if source.suffix == '.c']
+        objects = [self._object(source) for source in of_c]
+        if len(of_c) < len(sources):
+            # All at once: most of what a file takes are the headers, which are those of the others.
+            whole = self._folder / f'{name}.cpp'
+            rest = (f'#include "{source}"\n' for source in sources if source not in of_c)
+            whole.write_text(''.join(rest))
+            objects.append(self._object(whole))
         rpath = f'-Wl,-rpath,$ORIGIN:{PREFIX / "lib"}'
         soname = f'-Wl,-soname,{name},--no-as-needed'
         links = [*map(str, (*objects, *needs)), *self._libraries]

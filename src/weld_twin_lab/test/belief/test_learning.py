@@ -109,6 +109,22 @@ def test_a_set_of_many_names_is_believed_more_where_it_was_right_more_often():
     assert one < 0.4 < 0.8 < many
 
 
+def test_a_weight_that_is_left_out_leaves_its_feature_as_usual():
+    kind, far = 'name of many', 'rows'
+    others = tuple(name for name in TERMS if name != kind)
+    rows = examples(200, 12, kinds=others)
+    for k, e in enumerate(examples(4000, 13, slope=0.0, kinds=(kind,))):
+        # It hardly moves, says nothing but by chance, and lies far from zero.
+        features = {**e.features, far: 40.0 + 1e-3 * (k % 9)}
+        rows.append(e._replace(features=features))
+    content = learned(rows, {})
+    assert far not in content['statements'][kind]['weights']
+    told = calibration_from(content)
+    own = [e for e in rows if e.kind == kind]
+    p = np.array([told.probability(kind, e.features) for e in own])
+    assert p.mean() == pytest.approx(np.mean([e.right for e in own]), abs=0.03)
+
+
 def test_an_answer_is_learned_from_its_name_as_new_weights_report_it():
     rows = examples(400, 9, slope=4.0, kinds=('name',))
     others = tuple(kind for kind in TERMS if kind not in ('name', 'answer, named'))

@@ -244,6 +244,8 @@ class Scaled(NamedTuple):
 def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, Any]:
     scaled, fit = _fitted(table, signs)
     slopes = fit.slopes / scaled.spread
+    # What is left out counts as usual: it is at its mean in the constant.
+    slopes = np.where(np.abs(slopes) * (scaled.high - scaled.low) > LEAST, slopes, 0.0)
     return {
         'examples': len(table.right),
         'right': int(table.right.sum()),
@@ -251,7 +253,7 @@ def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, 
         'weights': {
             name: {'weight': _short(slope), 'low': _short(low), 'high': _short(high)}
             for name, slope, low, high in zip(names, slopes, scaled.low, scaled.high, strict=True)
-            if abs(slope) * (high - low) > LEAST
+            if slope
         },
     }
 

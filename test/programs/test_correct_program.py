@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import weld_twin_core as wt
 from weld_twin_lab.programs import plain_readers as readers
 from weld_twin_lab.programs.plain_arm import along, joints_for, tool_pose
+from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli.in_process import weld_twin
 
 MADE = Path(__file__).parent / 'made'
@@ -199,6 +200,33 @@ def test_a_tool_in_metres_is_refused_and_one_that_no_move_names_is_told(tmp_path
     assert "no move names the tool 'torch' that was given" in said.out
     said = corrected(tmp_path, text, '--tool', '1=0,0,250,0,0,0', '--force', **how)
     assert said.code == 0 and 'no move names' not in said.out
+
+
+def test_two_tools_that_the_program_only_names_are_not_both_that_of_the_robot_file(tmp_path):
+    robot = tmp_path / 'torch.yaml'
+    write_robot_yaml(robot, wt.load('fanuc_m10ia').with_frames(tool=along(2, 0.25)))
+    text = (MADE / 'bracket.ls').read_text()
+    other = text.replace('UT : 1', 'UT : 2', 1)
+    (tmp_path / 'off.yaml').write_text('- {effect: joint_offset, joint: joint_2, offset: 8e-4}\n')
+    for each, more, said_of in (
+        (text, (), 'the tool of the robot file was taken'),
+        (other, (), 'numbers of tools 1, 2 are not in the program'),
+        (other, ('--tool', '2=0,0,90,0,0,0'), 'the tool of the robot file was taken'),
+    ):
+        (tmp_path / 'p.ls').write_text(each)
+        said = weld_twin(
+            *(
+                'correct',
+                tmp_path / 'p.ls',
+                '--robot',
+                robot,
+                '--out',
+                tmp_path / 'out',
+                '--force',
+            ),
+            *('--model', tmp_path / 'off.yaml', *more),
+        )
+        assert said_of in said.out + said.err
 
 
 def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):

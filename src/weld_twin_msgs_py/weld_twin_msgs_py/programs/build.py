@@ -190,6 +190,7 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
     controller: where the controller's frames are on this robot, and the frames that were given.
     """
     count = len(controller.external)
+    controller.name_tools(step.tool for step in program.steps)
     arm = CarriedArm(robot.with_frames(base=np.eye(4)), count)
     points = [_with_external(point, count) for point in program.points]
     seam, pieces = -1, []

@@ -15,7 +15,7 @@ robot file is which, so a user says it. All count as the joint does, or the othe
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -175,6 +175,8 @@ class Controller:
     told."""
     positioner: bool = False
     """Some of the external axes move the workpiece."""
+    bare: set[str] = field(default_factory=set)
+    """Names of the tools of a program that nobody gives numbers for."""
 
     def tool(self, frame: Frame) -> Array:
         """
@@ -196,11 +198,23 @@ class Controller:
                 f'the numbers of tool {frame.name} are not in the program, and the robot file has '
                 'no tool' + _ask(frame, '--tool')
             )
+        if len(self.bare) > 1:
+            listed = ', '.join(sorted(self.bare))
+            raise DataError(
+                f'the numbers of tools {listed} are not in the program, and only one of them can be '
+                'that of the robot file' + _ask(frame, '--tool')
+            )
         self._note(
             f'the numbers of tool {frame.name} are not in the program; the tool of the robot file '
             'was taken'
         )
         return self.own_tool
+
+    def name_tools(self, frames: Iterable[Frame]) -> None:
+        """Take in all tools of a program: the robot file has the numbers of one."""
+        open_ = (frame for frame in frames if frame.name and frame.value is None and not frame.why)
+        self.bare.clear()
+        self.bare.update(f.name for f in open_ if f.name.lower() not in self.tools)
 
     def goes_along(self, frame: Frame) -> bool:
         """

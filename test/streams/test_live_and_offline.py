@@ -45,7 +45,7 @@ EXAMPLES = {
     'link_warm_up': {**ELBOW, 'strain': 1e-3, 'warming_time': 0.4},
     'thermal_growth': {'coefficient': 1.2e-5},
     'transmission_ripple': {**ELBOW, 'amplitude': 1e-3, 'order': 100.0, 'phase': 0.3},
-    'tool_sag': {'sag': [1e-4 * k for k in range(9)], 'turn': [2e-4 * k for k in range(9)]},
+    'tool_sag': {'sag': [1e-4 * k for k in range(9)]},
     'vibration': {**ELBOW, 'frequency': 8.0, 'damping': 0.05, 'gain': 0.3},
 }
 """Entries of effects that typical sizes do not do for."""

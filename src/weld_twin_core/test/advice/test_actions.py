@@ -81,7 +81,6 @@ def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     assert all(part in sentence for part in parts), sentence
 
 
-LEFT_OUT = {'second': 4, 'turn': 9}
 OF_CELLS = ('root_pose', 'guide_bend', 'guide_tilt')
 
 
@@ -109,8 +108,8 @@ def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
         where = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         more = {'source': 'wrist_1_joint'} if name == 'joint_coupling' else {}
         sizes = {
-            # `second` and `turn` may be left out, and take four numbers and nine
-            p.name: p.typical if p.size == 1 else [p.typical] * (p.size or LEFT_OUT.get(p.name, 4))
+            # `second`, a wave that may be left out, takes four
+            p.name: p.typical if p.size == 1 else [p.typical] * (p.size or 4)
             for p in kind.parameters
         }
         if kind.__module__.startswith('weld_twin_core') and not name.endswith(('curve', 'noise')):

@@ -230,10 +230,6 @@ def test_a_robot_survives_its_file(robot):
     assert again.to_mapping().keys() == robot.to_mapping().keys()
 
 
-LEFT_OUT = {'second': 4, 'turn': 9}
-"""Numbers of parameters that an effect may leave out."""
-
-
 @pytest.mark.parametrize('name', sorted(REGISTRY))
 def test_an_effect_survives_its_file(name, arm, positioner):
     of_cell = name in ('root_pose', 'guide_bend', 'guide_tilt')
@@ -249,7 +245,7 @@ def test_an_effect_survives_its_file(name, arm, positioner):
     fields = set(kind.__dataclass_fields__)
     entry = {'effect': name} | {key: value for key, value in given.items() if key in fields}
     for parameter in kind.parameters:
-        size = parameter.size or LEFT_OUT.get(parameter.name, 0)
+        size = parameter.size or (4 if parameter.name == 'second' else 0)
         values = [0.1 * (k + 1) for k in range(size)] if size > 2 else [0.5, 0.6]
         entry[parameter.name] = values if parameter.size != 1 else 0.25
         if name == 'frame_curve':  # two knots for each of three axes

@@ -282,8 +282,11 @@ def tool_sag(cell):
     for row in cell.textbook.rows(cell.robot, cell.q)[cell.robot.behind :]:
         turn = turn @ row[:3, :3]
     down = turn.T @ cell.robot.gravity / np.linalg.norm(cell.robot.gravity)
-    sag, lean = SAG.reshape(3, 3) @ down, 10.0 * SAG[::-1].reshape(3, 3) @ down
-    cell.tool = cell.textbook.frame(cell.robot.T_flange_tool, sag, lean, 'right')
+    tool = cell.robot.T_flange_tool
+    # The least turn about the flange that takes the tip along; its axes are the tool's.
+    sag = SAG.reshape(3, 3) @ down
+    least = np.linalg.pinv([np.cross(axis, tool[:3, 3]) for axis in tool[:3, :3].T]).T @ sag
+    cell.tool = cell.textbook.frame(tool, sag, least, 'right')
 
 
 def hose_pull(cell):
@@ -376,7 +379,7 @@ DEFINITIONS = {
     'measurement_scale': ({'scale': 2e-3}, measurement_scale),
     'pedestal_tilt': ({'compliance': [1e-5, 3e-5]}, pedestal_tilt),
     'axis_compliance': ({'joint': 'j3', 'compliance': 1e-5}, axis_compliance),
-    'tool_sag': ({'sag': SAG, 'turn': 10.0 * SAG[::-1]}, tool_sag),
+    'tool_sag': ({'sag': SAG}, tool_sag),
     'hose_pull': ({'force': [10.0, -20.0, 30.0], 'stiffness': 40.0}, hose_pull),
     'refraction': (
         {'warming': [100.0, -200.0, 300.0], 'instrument': [-4.0, 1.0, 0.0]},

@@ -35,7 +35,7 @@ ENTRIES = {
     'vibration': {'joint': 'j2', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.3},
     'hose_pull': {'force': [10.0, -20.0, 30.0], 'stiffness': 40.0},
     'axis_compliance': {'joint': 'j3', 'compliance': 2e-6},
-    'tool_sag': {'sag': [1e-4 * k for k in range(9)], 'turn': [2e-4 * k for k in range(9)]},
+    'tool_sag': {'sag': [2e-5 * k for k in range(9)]},
     'refraction': {'warming': [1.0, -2.0, 3.0]},
 }
 """By its name the entry of an effect that typical sizes do not do for."""

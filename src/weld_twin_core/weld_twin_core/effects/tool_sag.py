@@ -44,7 +44,7 @@ class _Search(SearchHooks):
 
 @register
 class ToolSag(LinearEffect):
-    """The tip goes along the flange's axes by ``sag``, row by row, times the direction of gravity there."""
+    """The tip goes along the flange's axes by ``sag``, row by row, times how far down each points."""
 
     sag: Value = (0.0,) * 9
 

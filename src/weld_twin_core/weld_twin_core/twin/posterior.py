@@ -313,14 +313,7 @@ class Posterior:
             way = unit((count, 3))
             way *= (np.resize(rest.peaks, count) / np.linalg.norm(way, axis=1))[:, None]
             of_arm[place, np.arange(count)] += way
-        jumped = jumps(features)
-        if jumped.any():
-            # Some come a place sooner or later. All that were recorded fit: rule of succession.
-            share = rng.beta(1.0, 1.0 + rest.jumps, (count, 1))
-            amiss = rng.random((len(jumped), count, 1)) < share
-            late = rng.random(amiss.shape) < 0.5
-            of_arm[:-1] += (amiss & ~late) * jumped[:, None]
-            of_arm[1:] -= (amiss & late) * jumped[:, None]
+        _misplace(of_arm, jumps(features), rest.jumps, rng)
         of_frames = np.tensordot(columns[:frames], steps[:, :frames], axes=(0, 1))
         off = np.stack([of_arm + of_frames.transpose(1, 2, 0), of_arm], axis=1)
         return off * rest.grown(here)[:, None, None, None]
@@ -383,6 +376,22 @@ def _bends(q: Array) -> Array:
     slopes = rng.standard_normal((q.shape[1], WAVES)) / ALIKE
     phase = rng.uniform(0.0, 2.0 * np.pi, WAVES)
     return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(q @ slopes + phase))
+
+
+def _misplace(moved: Array, jumped: Array, recorded: int, rng: np.random.Generator) -> None:
+    """
+    Let some jumps come a place sooner or later in what models move a path, in place.
+
+    moved: shape (M, count, 3). jumped: from each place to the next, shape (M - 1, 3).
+    recorded: jumps that all were where the model has them; the rule of succession says of the next.
+    """
+    if not jumped.any():
+        return
+    shape = (len(jumped), moved.shape[1], 1)
+    amiss = rng.random(shape) < rng.beta(1.0, 1.0 + recorded, shape[1:])
+    late = rng.random(shape) < 0.5
+    moved[:-1] += (amiss & ~late) * jumped[:, None]
+    moved[1:] -= (amiss & late) * jumped[:, None]
 
 
 class Drawn(NamedTuple):

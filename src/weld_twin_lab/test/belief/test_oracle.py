@@ -16,7 +16,7 @@ pytest.importorskip('mujoco')
 @pytest.fixture
 def case():
     """One cause at stations: a twist, of a size that shows."""
-    case = drawn(4401, 66, SEVERAL).case
+    case = drawn(4401, 330, SEVERAL).case
     assert (case.lot.motion, case.lot.families) == ('stations', ('link_twist',))
     return case
 
@@ -35,4 +35,4 @@ def test_what_shows_is_sure_and_what_does_not_is_shared(case, monkeypatch):
     assert plain > 0.99
     assert faint > 0.99  # what differs by less than the noise predicts as well
     monkeypatch.setattr(oracle, 'AS_WELL', 0.0)
-    assert 0.1 < sure_of(case, 0.02) < 0.9
+    assert sure_of(case, 0.02) < 0.2  # any of the others does as well

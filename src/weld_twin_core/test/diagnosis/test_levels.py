@@ -287,9 +287,11 @@ def test_a_loose_tool_that_falls_to_its_lower_side_is_no_noise():
         wt.Measurements(t, there + [2.1, -1.3, 0.4] + rng.normal(scale=3e-5, size=there.shape))
     )
     found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
-    assert found.status == 'unknown'
-    (cause,) = found.causes
-    assert (cause.place[0][0], cause.dependence[0][0]) == ('tool', 'load')
+    assert found.status == 'unknown' and 'load at tool' in found.unexplained.structure
+    places = {(cause.place[0][0], cause.dependence[0][0]) for cause in found.causes}
+    assert places == {('tool', 'load')}
+    # One that sags takes most of it, and is no name to be sure of.
+    assert not any(cause.sure for cause in found.causes if cause.name)
 
 
 def test_what_is_far_wider_than_noise_is_told_as_above_it():

@@ -290,20 +290,22 @@ def _yielding(maker: Features) -> Array:
 
 def _hanging(maker: Features) -> Array:
     """
-    Return the tool pushed along its axes by what hangs on it, shape (9, 6, M).
+    Return the tool pushed along its axes by what hangs on it, shape (12, 6, M).
 
-    A bracket sags, and a loose tool falls to its lower side: along any axis of the tool by how far
-    down each of its axes points.
+    A bracket sags, along any axis of the tool by how far down each of its axes points; and a loose
+    tool falls along each axis to the side that is lower, by as much however low it is.
     """
     poses = maker.run.poses
     # A tool that no joint turns has one rotation for all samples.
     rotation = np.broadcast_to(poses.rotation, (*poses.position.shape, 3))
     down = np.asarray(maker.view.frames.root_rotation @ maker.view.robot.gravity)
     weight = np.einsum('mji,mj->mi', rotation, np.broadcast_to(down, rotation.shape[:2]))
-    out = np.zeros((9, 6, len(rotation)))
-    for k, (axis, pulled) in enumerate(np.ndindex(3, 3)):
-        out[k, :3] = (rotation[:, :, axis] * weight[:, pulled, None]).T
-    return out
+    out = np.zeros((3, 4, 6, len(rotation)))
+    for axis in range(3):
+        way = rotation[:, :, axis].T
+        out[axis, :3, :3] = weight.T[:, None] * way
+        out[axis, 3, :3] = np.sign(weight[:, axis]) * way
+    return out.reshape(12, 6, -1)
 
 
 def _leaning(maker: Features) -> Array:

@@ -197,5 +197,7 @@ def _tells(group: Group, *, at_joint: bool) -> bool:
     if group.on == 'direction':
         return not group.curves
     return not at_joint and (
-        group.on == 'time' or (group.on, len(group.columns)) == ('place', FIELD)
+        group.on == 'time'
+        or group.at == 'tool'
+        or (group.on, len(group.columns)) == ('place', FIELD)
     )

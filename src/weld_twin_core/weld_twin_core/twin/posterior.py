@@ -378,7 +378,7 @@ def _bends(q: Array) -> Array:
     return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(q @ slopes + phase))
 
 
-def _misplace(moved: Array, jumped: Array, recorded: int, rng: np.random.Generator) -> None:
+def _misplace(moved: Array, jumped: Array, recorded: float, rng: np.random.Generator) -> None:
     """
     Let some jumps come a place sooner or later in what models move a path, in place.
 

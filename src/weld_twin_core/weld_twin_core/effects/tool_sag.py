@@ -12,15 +12,13 @@ arm play no part.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import LinearEffect
-from .hooks import Hooked, SearchHooks, Traits
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Stage, Value, View
 from .wording import number
@@ -28,18 +26,8 @@ from .wording import number
 _TURNED = 1e-2
 """Change of gravity's direction in the flange [-] up to which a sag is one with the tool's pose: some
 tenths of a millimetre change by less than a tracker sees."""
-
-
 _SHORT = 1e-2
 """Length of a tool [m] up to which its tip goes without a turn: a probe at the flange has no bracket."""
-
-
-class _Search(SearchHooks):
-    effect: ToolSag
-    kind: type[ToolSag]
-
-    def joined(self, other: ToolSag) -> ToolSag:
-        return replace(self.effect, sag=np.asarray(self.effect.sag) + np.asarray(other.sag))
 
 
 @register
@@ -70,17 +58,16 @@ class ToolSag(LinearEffect):
             (1e-4, 3e-3), 'derived: a bracket that a torch of 3 kg bends by 3 mm is broken'
         ),
     )
-    search = Hooked(_Search)
 
     def per_unit(self, view: View) -> list[Shift]:
         """Return the way along each axis and the turn with it, by how far down each of them points."""
         down, tool = _down(view), view.robot.T_flange_tool
         lever = tool[:3, 3]
         length = float(np.linalg.norm(lever))
-        # Rows: the turn about the tool's own axes for a way along each axis of the flange.
-        turns = np.cross(lever, np.eye(3)) @ tool[:3, :3] / max(length, _SHORT) ** 2
-        if length <= _SHORT:
-            turns = np.zeros((3, 3))
+        turns = np.zeros((3, 3))
+        if length > _SHORT:
+            # Rows: the turn about the tool's own axes for a way along each axis of the flange.
+            turns = np.cross(lever, np.eye(3)) @ tool[:3, :3] / length**2
         return [
             {('tool', way): down[..., k]}
             | {('tool', 3 + about): by * down[..., k] for about, by in enumerate(turns[way])}
@@ -103,7 +90,7 @@ class ToolSag(LinearEffect):
             np.linalg.norm(np.asarray(self.sag).reshape(-1, 3, 3), 2, axis=(-2, -1)).max()
         )
         return (
-            f'Stiffen the bracket of the tool, and see what its cable hangs on: the tip sags by up to '
+            'Stiffen the bracket of the tool, and see what its cable hangs on: the tip sags by up to '
             f'{number(most * 1e3)} mm as the wrist turns it.'
         )
 

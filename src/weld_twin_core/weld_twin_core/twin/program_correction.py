@@ -341,14 +341,15 @@ class _Work(NamedTuple):
 
 
 def _wound(move: Move, before: Array, after: Array) -> str:
-    """Return that the flags of a point, which stay as written, would turn an axis far round."""
+    """Return that the flags of a point, which stay as written, would turn an axis or flip the wrist."""
     axes = () if move.astray is None else move.astray(before, after)
     if not axes:
         return ''
     named = ', '.join(map(str, axes))
     return (
         f'axis {named} would pass an angle at which the flags of the point change, and these stay as '
-        'written: the controller would turn it far round; give this point in joints'
+        'written: the controller would turn it by 360 degrees, or flip the wrist; give this point in '
+        'joints'
     )
 
 

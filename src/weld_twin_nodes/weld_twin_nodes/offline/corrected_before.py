@@ -36,8 +36,8 @@ def holds(folder: Path, texts: Collection[bytes]) -> bool:
 
 
 def twice(program: Path | str, why: str) -> DataError:
-    """Return that a program was corrected already."""
+    """Return that a program was corrected already, and how that is known."""
     return DataError(
-        f"'{program}' was corrected already, {why}, and would be corrected twice; give the program "
-        'as it was before'
+        f"'{program}' was corrected already: {why}; give the program as it was before, or its points "
+        'are moved twice'
     )

@@ -146,7 +146,7 @@ class _Site:
         texts = [(place / name).read_bytes() for name in job.names]
         for before in self._queue.of(job.user):
             if before.kind == PROGRAM and holds(self._queue.folder(before) / FOUND, texts):
-                raise twice(main_file(job.names), 'when you dropped it before')
+                raise twice(main_file(job.names), 'an earlier correction of yours wrote it')
 
     def _party(self, request: Request) -> str:
         """Return with whom somebody shares what may wait; empty for nobody."""

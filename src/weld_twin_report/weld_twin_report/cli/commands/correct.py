@@ -44,7 +44,7 @@ def run(given: Given) -> int:
 def _refuse_corrected(program: Path) -> None:
     """Refuse a program that lies where a correction wrote it."""
     if moved(program.resolve().parent) == program.name:
-        raise twice(program, f"as '{RESULT}' beside it says")
+        raise twice(program, f"'{RESULT}' beside it says so")
 
 
 def _refuse_written(program: Program, given: Given) -> None:
@@ -54,7 +54,7 @@ def _refuse_written(program: Program, given: Given) -> None:
     beside = sorted(file.parent for file in out.absolute().parent.glob(f'*/{RESULT}'))
     for folder in (out, *beside):
         if holds(folder, texts):
-            raise twice(given.program, f"for '{folder}' holds the same as corrected")
+            raise twice(given.program, f"'{folder}' holds it as a correction wrote it")
 
 
 def _corrected_bag(given: Given) -> int:

@@ -383,7 +383,8 @@ def _misplace(moved: Array, jumped: Array, recorded: float, rng: np.random.Gener
     Let some jumps come a place sooner or later in what models move a path, in place.
 
     moved: shape (M, count, 3). jumped: from each place to the next, shape (M - 1, 3).
-    recorded: jumps that all were where the model has them; the rule of succession says of the next.
+    recorded: how many were seen, all where the model has them; by Laplace's rule of succession so
+    many of the next ones are elsewhere.
     """
     if not jumped.any():
         return

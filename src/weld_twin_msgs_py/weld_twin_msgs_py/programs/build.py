@@ -319,7 +319,7 @@ def flags_kept(kind: Kind, point: Point, flags: Sequence[Flag]) -> Astray | None
     """
     Return what tells the axes that pass where flags change; of joint moves to poses alone.
 
-    flags: of the controller. One that it has not costs a point, one that is missing turns an arm.
+    flags: of the controller. One too many leaves a point as it was, one too few turns an arm round.
     """
     if kind != 'joint' or point.notation.joints:
         return None

@@ -7,11 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_cells import tiny
+from diagnosis_cells import known_scale, tiny
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.open_directions import shown
 from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.answer.named_effects import _along, _parted
 from weld_twin_core.diagnosis.frames.alignment import chord
 from weld_twin_core.diagnosis.predicting.leftover import _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
@@ -22,6 +24,8 @@ from weld_twin_core.diagnosis.soundness.mixups import _fixture
 from weld_twin_core.diagnosis.soundness.slips import _Seen
 from weld_twin_core.diagnosis.soundness.suspicions import turned_bases
 from weld_twin_core.diagnosis.unseen.groups import _curved, smooth_field
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.effects import JointOffset
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 pytestmark = pytest.mark.drawn
@@ -190,3 +194,25 @@ def test_a_smooth_field_has_slopes_and_bends_of_all_three_coordinates():
 def test_turns_are_as_far_apart_as_the_ends_of_two_pointers():
     turned = Rotation.from_rotvec([0.0, 0.0, 60.0], degrees=True).as_matrix()
     assert chord(np.eye(3), turned) == pytest.approx(2.0 * np.sin(np.radians(30.0)))
+
+
+def test_effects_move_the_tool_along_with_all_of_them_and_have_parts_of_that():
+    zeros = (JointOffset('shoulder_lift_joint', 8e-4), JointOffset('elbow_joint', -5e-4))
+    problem, model = tiny(zeros, count=20, turned=False)
+    scale = known_scale(problem)
+    found = fit(problem, model.with_found(zeros), scale)
+    unseen = Unseen.of(problem, scale, found, np.zeros(0))
+    moved = np.array([[0.0, 0.0], [2e-4, -1e-4]])
+    along, (recording,) = _along(unseen, moved), problem.recordings
+
+    def tip(*effects):
+        return model.with_found(effects).twin(0).poses(recording, recording.seen.t).position
+
+    for row, off in zip(along, moved, strict=True):
+        each = [
+            replace(e, offset=e.offset + d) for e, d in zip(found.model.found, off, strict=True)
+        ]
+        alone = [tip(e) - tip() for e in each]
+        expected = [float((one * (alone[0] + alone[1])).sum()) for one in alone]
+        assert row == pytest.approx(expected, rel=5e-3)
+    assert _parted(np.array([[3.0, 1.0], [2.0, -1.0]])).tolist() == [[0.75, 0.25], [1.0, 0.0]]

@@ -14,9 +14,9 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns,
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
 from weld_twin_core.diagnosis.advice.next_touches import MOST, _Option
 from weld_twin_core.diagnosis.advice.postures import Limits, Room, joined, widened
-from weld_twin_core.diagnosis.advice.separation import Parting
-from weld_twin_core.diagnosis.algebra.problem import Model, Problem
-from weld_twin_core.diagnosis.answer.next_step import _promise
+from weld_twin_core.diagnosis.advice.separation import Parting, _ahead
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
+from weld_twin_core.diagnosis.answer.next_step import _in_place, _promise
 from weld_twin_core.effects import Backlash, JointCompliance, JointOffset
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
@@ -58,6 +58,26 @@ def test_a_difference_that_the_other_explanation_can_make_parts_nothing(rng):
     stack[-1] = stack[0] - 2.0 * stack[1]
     parting = Parting([stack @ stack.T] * 2, [np.array([stack @ stack.T])] * 2)
     assert parting.before.max() < 1e-3 * np.linalg.norm(stack[-1])
+
+
+@pytest.mark.parametrize(('static', 'telling'), [(True, 60), (False, 40)])
+def test_a_station_counts_by_itself_and_a_moving_arm_every_seventh_of_a_second(
+    problem, static, telling
+):
+    """Of a zero of the first joint, by how far the tool is from its axis while that joint turns."""
+    robot, home = load('ur5'), problem.recordings[0].joints.q[0]
+    model = Model(robot, (robot.T_world_base,))
+    ways = [(JointOffset(robot.joint_names[0], 2e-3),), (JointOffset(robot.joint_names[0], 1e-3),)]
+    made = SimpleNamespace(model=model, new_base=False, new_tool=False)
+    t = np.linspace(0.0, 6.0, 60)
+    turning = home + np.outer(t / 6.0, np.eye(6)[0])
+    motion = JointMotion(t, turning, static=static)
+    side = _ahead(problem, made, Recording('next', motion), ways, Scale(2e-5, 1.0, (np.ones(30),)))
+    tip = model.twin(0).poses(Recording('next', motion), t).position
+    assert side.rows == 3
+    apart = np.linalg.norm(side.predicted[0] - side.predicted[1])
+    expected = 1e-3 * np.hypot(tip[0, 0], tip[0, 1]) / 2e-5
+    assert apart == pytest.approx(expected * np.sqrt(telling), rel=1e-3)
 
 
 def candidate(*seconds, static=False):
@@ -132,16 +152,18 @@ def problem(rng):
     return Problem((Recording('seen', JointMotion(t, q, static=True), seen),), frozenset())
 
 
-def test_a_way_is_travelled_within_half_of_speed_and_acceleration(problem):
+@pytest.mark.parametrize(('way', 'speed'), [(0.2, 1.0), (2.0, 1.0), (0.5, 0.25)])
+def test_a_way_takes_as_long_as_half_of_speed_or_of_acceleration_asks(problem, way, speed):
     robot = load('ur5')
     room = Room(problem, robot, Limits())
-    stops = [room.home, room.home + 0.5, room.home]
-    for speed in (1.0, 0.25):
-        made = room.travel(stops, speed)
-        rates = np.diff(made.q, axis=0) / np.diff(made.t)[:, None]
-        most = (np.abs(rates) / (speed * robot.max_velocity)).max()
-        assert most < 0.501
-        np.testing.assert_allclose(made.q[[0, -1]], [room.home] * 2, atol=1e-12)
+    stops = [room.home, room.home + way, room.home]
+    made = room.travel(stops, speed)
+    step = made.t[1] - made.t[0]
+    rates = np.abs(np.diff(made.q, axis=0)) / step
+    jumps = np.abs(np.diff(made.q, n=2, axis=0)) / step**2
+    shares = (rates / (speed * robot.max_velocity)).max(), (jumps / robot.max_acceleration).max()
+    assert max(shares) == pytest.approx(0.5, rel=0.1) and max(shares) < 0.501
+    np.testing.assert_allclose(made.q[[0, -1]], [room.home] * 2, atol=1e-12)
     assert np.abs(made.q - stops[1]).sum(axis=1).min() < 1e-9
 
 
@@ -178,6 +200,25 @@ def test_no_more_is_promised_than_what_is_believed():
     assert _promise(verdict(status='unknown', confidence=0.3, sets=[]), far) == pytest.approx(0.7)
     nameless = asking(1e3, 'joint_curve')
     assert _promise(verdict(status='unknown', confidence=0.3), nameless) == pytest.approx(0.5)
+
+
+def test_explanations_with_another_in_place_of_one_come_likeliest_first_and_not_the_one_at_hand():
+    def other(site, probability, found):
+        model = SimpleNamespace(found=found)
+        return SimpleNamespace(
+            site=site, probability=probability, fit=SimpleNamespace(model=model)
+        )
+
+    listed = [
+        [other(1, 0.2, 'two'), other(2, 0.7, 'own')],
+        [other(1, 0.4, 'one'), other(3, 0.1, 'far')],
+    ]
+    result = SimpleNamespace(
+        small=SimpleNamespace(model=SimpleNamespace(found='own')), candidate_sets=listed
+    )
+    named = verdict(sets=[[1, 2]])
+    assert _in_place(result, named, named=True) == ['one', 'two']
+    assert _in_place(result, named, named=False) == ['far']
 
 
 def test_explanations_are_told_by_what_each_has_alone():

@@ -3,6 +3,7 @@
 """Images made by a pinhole written out here become the poses they were made of."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.bundle import adjusted, seen_by
 from weld_twin_core.cameras import Camera, Lens, Sightings, Target
+from weld_twin_core.cameras.sightings import Fitted
+from weld_twin_core.diagnosis.soundness import images as soundness_of_images
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
@@ -137,3 +140,41 @@ def test_a_board_that_is_less_exact_than_was_said_is_told_and_by_how_much():
     assert '42 of 42 images tell a pose' in notes[0]
     longer = re.search(r'focal length (\S+) %', ' '.join(notes))
     assert float(longer[1]) == pytest.approx(100.0 * (1.0 / 1.01 - 1.0), abs=0.1)
+
+
+def wrong_with(images, pixel=0.2, off=(0.0, 0.0)):
+    """Return kinds and places of what is wrong, by what was found of pixels and of both lenses."""
+    fitted = replace(images, fitted=Fitted(pixel, np.outer(off, np.ones(9))))
+    return [(found.kind, found.at) for found in soundness_of_images._by_themselves(fitted)]
+
+
+def facing(images, points=BOARD):
+    """Return images of a board that faces them, of points given so."""
+    return replace(images, targets=(replace(images.targets[0], points=points, facing=True),))
+
+
+def test_a_board_seen_from_behind_has_its_points_mirror_wise():
+    images = seen(board_before_camera(np.random.default_rng(2)))
+    assert not wrong_with(facing(images))
+    assert wrong_with(facing(images, BOARD * [-1.0, 1.0, 1.0])) == [
+        ('target_mirrored', ('board',))
+    ]
+
+
+def test_what_is_wrong_with_images_is_what_undone_leaves_lenses_as_calibrated(monkeypatch):
+    poses = board_before_camera(np.random.default_rng(2))
+    images = by_two(poses, {(0, 0): range(3), (1, 0): range(3), (1, 1): range(3)})
+    left, right = images.cameras
+    right = replace(right, lens=Lens([1.3 * FOCAL] * 2, CENTRE, []))
+    swapped = replace(images, cameras=(replace(left, lens=right.lens), replace(right, lens=LENS)))
+
+    def adjusted(trial):
+        """Return what a fit finds where the cameras must be those above."""
+        good = trial.cameras[1].lens is right.lens and trial.cameras[0].lens is LENS
+        return Fitted(0.2 if good else 4.0, np.full((2, 9), 0.0 if good else 40.0))
+
+    monkeypatch.setattr(soundness_of_images, 'adjusted', adjusted)
+    assert wrong_with(swapped, 4.0, (40.0, 40.0)) == [('cameras_swapped', ('left',))]
+    # The worse of two lenses is told, and none that is as far off as calibrations are.
+    assert wrong_with(images, 0.2, (3.0, 40.0)) == [('intrinsics', ('right',))]
+    assert not wrong_with(images, 0.2, (1.0, 2.0)) and not wrong_with(images, 1.7, (1.0, 2.0))

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, places, spreads
 from weld_twin_core.diagnosis.algebra.fit import design, fit
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.frames.aligned import _tool_point, aligned
 from weld_twin_core.diagnosis.unseen import where
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.errors import DataError
@@ -227,3 +228,14 @@ def elbow_up_and_down(offset):
             postures.append([0.3 - sign * inner, sign * bend - offset])
             labels.append(f'pin {bend}')
     return np.array(postures), labels
+
+
+def test_the_tool_point_is_what_stays_in_place_and_one_slip_does_not_move_it():
+    rng, tip = np.random.default_rng(3), np.array([0.02, -0.05, 0.3])
+    touched = []
+    for pin in ([0.6, 0.1, 0.2], [0.4, -0.3, 0.1]):
+        turn = Rotation.from_rotvec(rng.uniform(-1.0, 1.0, (6, 3))).as_matrix()
+        touched.append((pin - turn @ tip, turn))
+    np.testing.assert_allclose(_tool_point(touched), tip, atol=1e-9)
+    touched[1][0][2] += [0.0, 5e-3, 0.0]
+    np.testing.assert_allclose(_tool_point(touched), tip, atol=1e-3)

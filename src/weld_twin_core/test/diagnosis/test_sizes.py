@@ -5,12 +5,21 @@
 from __future__ import annotations
 
 import warnings
+from itertools import product
 
 import numpy as np
 import pytest
 
 from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
-from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, hidden, weighed
+from weld_twin_core.diagnosis.predicting.sizes import (
+    BELIEF,
+    SIZES,
+    Prior,
+    Rows,
+    _Chain,
+    hidden,
+    weighed,
+)
 
 pytestmark = pytest.mark.drawn
 
@@ -84,6 +93,33 @@ def test_of_two_errors_that_move_the_tool_alike_the_wrong_one_is_not_told_for_su
         known = weighed(rows, prior, 1.0)
         off.append((known.mean[1:] - truth) / np.sqrt(np.diag(known.covariance))[1:])
     assert np.sqrt(np.mean(np.square(off))) < 1.5 and np.abs(off).max() < 5.0
+
+
+def test_sizes_are_drawn_as_often_as_the_normal_law_of_the_rows_says():
+    """Of a family with one size for two errors and an error that looks like one of them."""
+    rng = np.random.default_rng(5)
+    frame, one, other, more = rng.normal(size=(4, 12))
+    columns = np.stack([frame, one, other, one + 0.5 * more])
+    residual = 3.0 * one + rng.normal(size=12)
+    middle, width = np.array([0.0, 0.5, -1.0, 1.0]), np.array([50.0, 1.0, 2.0, 3.0])
+    prior = Prior(middle, width, np.array([-1, 0, 0, 1]), NO.repeat(2), np.array([True, False]))
+    noise, share = 1.3, 0.8
+    chain = _Chain(Rows(columns, residual, share), prior, noise)
+    often = np.zeros((2, SIZES.size))
+    for _ in range(2000):
+        chain._sizes()
+        for k, size in enumerate(chain.size[[1, 3]]):
+            often[k, np.searchsorted(SIZES, size)] += 1.0 / 2000.0
+    assert chain.size[1] == chain.size[2]
+    law = np.zeros((SIZES.size, SIZES.size))
+    for (i, first), (j, second) in product(enumerate(SIZES), repeat=2):
+        spread = width * [1.0, first, first, second]
+        covariance = (columns.T * spread**2) @ columns + noise / share * np.eye(12)
+        off = residual - middle @ columns
+        likely = off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1]
+        law[i, j] = np.exp(-likely / 2.0) * BELIEF[i] * BELIEF[j]
+    law /= law.sum()
+    np.testing.assert_allclose(often, [law.sum(axis=1), law.sum(axis=0)], atol=0.05)
 
 
 ROWS = 400

@@ -11,14 +11,15 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.soundness import mixups as mix_ups
 from weld_twin_core.diagnosis.soundness.base_change import _of_strays, _scale, rest_of
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
-from weld_twin_core.diagnosis.soundness.evidence import Case
+from weld_twin_core.diagnosis.soundness.evidence import Case, mistake
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _farther, _larger
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
-from weld_twin_core.diagnosis.soundness.set_up import setup
+from weld_twin_core.diagnosis.soundness.set_up import _words, setup
 from weld_twin_core.diagnosis.soundness.slips import Slip, _simplest, changes
 from weld_twin_core.diagnosis.soundness.snapshot import Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import streams
@@ -109,6 +110,45 @@ def test_lengths_of_links_count_together_and_the_gap_by_its_limit(ur5, still):
     assert arm._replace(strain=strain, gap=3e-3).bent == pytest.approx(3.0)
     strain[0] = 0.9
     assert arm._replace(strain=strain, gap=0.0, displaced=0.95).off == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize(
+    ('gap', 'off', 'still_other', 'told'),
+    [
+        (5e-3, 0.5, None, 'abb'),
+        (5e-3, 1.5, None, 'links'),
+        (5e-3, 0.5, 'links', 'links'),
+        (3e-3, 0.5, None, None),
+    ],
+)
+def test_another_bundled_robot_is_told_where_its_links_leave_nothing_to_explain(
+    monkeypatch, ur5, gap, off, still_other, told
+):
+    other, robot = (mistake(name, 'other_robot', ('robot',), '') for name in ('links', 'abb'))
+    shot, undone = (SimpleNamespace(robot=ur5, align=(), remaining=r) for r in (1.0, 2.0))
+    arm = SimpleNamespace(off=off)
+    found = {id(shot): other, id(undone): still_other and other}
+    monkeypatch.setattr(mix_ups, '_other_links', lambda asked: found[id(asked)])
+    tried = mix_ups._Tried(robot, undone, arm)
+    monkeypatch.setattr(mix_ups, '_best', lambda *_: tried)
+    result = mix_ups._links(SimpleNamespace(gap=gap), shot, arm)
+    assert [each.sentence.rstrip('.').lower() for each in result] == ([told] if told else [])
+
+
+def test_tools_that_sit_elsewhere_are_listed_and_the_farthest_is_measured():
+    far = {
+        1: ToolPose((2e-3, 0.0, 0.0)),
+        2: ToolPose((0.0, 0.0, 0.0), (0.0, 0.0, 0.06)),
+        3: ToolPose((1e-4, 0.0, 0.0)),
+    }
+    model = SimpleNamespace(changes=[Change(k, effect) for k, effect in far.items()])
+    case = SimpleNamespace(recordings=[SimpleNamespace(name=name) for name in 'abcd'])
+    words = _words(case, SimpleNamespace(model=model))
+    assert 'of b and c sits elsewhere than that of a, c most' in words
+    assert words.endswith('away and turned by 3.44 degrees')
+    alone = SimpleNamespace(changes=model.changes[:1])
+    words = _words(case, SimpleNamespace(model=alone))
+    assert words.endswith('of b sits elsewhere than that of a: 2 mm away')
 
 
 def test_what_can_be_undone_is_undone_only_where_that_is_asked_for(ur5, rng):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from measured_cells import asked, moving, recorded, rejointed, stations
 
+from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness import mixups as mix_ups
@@ -19,7 +20,7 @@ from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _farther, _larger
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
-from weld_twin_core.diagnosis.soundness.set_up import _words, setup
+from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
 from weld_twin_core.diagnosis.soundness.slips import Slip, _simplest, changes
 from weld_twin_core.diagnosis.soundness.snapshot import Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import streams
@@ -151,6 +152,20 @@ def test_tools_that_sit_elsewhere_are_listed_and_the_farthest_is_measured():
     assert words.endswith('of b sits elsewhere than that of a: 2 mm away')
 
 
+def test_tools_of_recordings_are_found_each_by_itself_and_told_against_the_first(ur5, rng):
+    steps = ([0.0, 0.0, 0.0], [3e-3, 0.0, -1e-3], [0.0, 2e-3, 0.0])
+    runs = []
+    for k, step in enumerate(steps):
+        tool = np.array(ur5.T_flange_tool)
+        tool[:3, 3] += step
+        made = ur5.with_frames(tool=tool)
+        runs.append(recorded(made, stations(ur5, rng, 20), rng, name=f'{k}'))
+    own = _with_tools(Snapshot(tuple(runs), asked(ur5, *runs)[1])).model
+    assert [change.recording for change in own.changes] == [1, 2]
+    for change, step in zip(own.changes, steps[1:], strict=True):
+        assert change.effect.fit.coordinates()[:3] == pytest.approx(step, abs=1e-4)
+
+
 def test_what_can_be_undone_is_undone_only_where_that_is_asked_for(ur5, rng):
     motion = moving(ur5, rng)
     bad = recorded(ur5, JointMotion(motion.t, motion.q, np.zeros_like(motion.q)), rng, points=True)
@@ -162,6 +177,10 @@ def test_what_can_be_undone_is_undone_only_where_that_is_asked_for(ur5, rng):
     left = examine(Given((bad,), ur5))
     assert left.posed is None and not left.unsound[0].applied and not left.mistakes
     assert left.given.recordings[0] is bad and len(left.checks) == 1
+    refused = diagnose([bad], ur5).as_dict()
+    assert refused['verdict']['status'] == 'unsound' and len(refused['unsound']) == 1
+    empty = ('gap', 'where', 'candidates', 'shrink', 'unexplained', 'model', 'posterior')
+    assert all(refused[key] is None for key in empty)
 
 
 # Pieces -----------------------------------------------------------------------------------------

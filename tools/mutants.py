@@ -46,18 +46,32 @@ for threads in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
 
 ROOT = Path(__file__).parents[1]
 ENGINE = 'weld_twin_core.diagnosis'
+CORE = 'src/weld_twin_core/test'
+WHOLE = 'kept_answers kept_findings verdict definite'
+"""Files of tests that make whole diagnoses, or see much of one: they ask about every room of it."""
 TESTS = {
-    'test/diagnosis': 'kept_answers verdict standard_errors unseen_stretches swapped_alternatives fit '
-    'atoms noise_and_interval learned_priors many_small_errors springs_at_rest evidence '
-    'normal_equations definite impossible_effects steps_by_hand',
-    'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '
-    'stray_readings folds',
-    'src/weld_twin_core/test/soundness': 'alignment checks_by_hand kept_findings mends mixups_by_hand '
-    'soundness trials',
-    'src/weld_twin_core/test/advice': 'next_experiment pieces_by_hand',
+    'algebra': 'fit columns evidence normal_equations starts steps_by_hand sizes stray_readings '
+    'structural_aliases noise_and_interval learned_priors levels changes springs_at_rest',
+    'result': 'contributions',
+    'evidence': 'evidence decision',
+    'hypotheses': 'impossible_effects swapped_alternatives carrying needed_kinds unseen_stretches',
+    'frames': 'alignment changes known_places touches steps_by_hand',
+    'soundness': 'alignment checks_by_hand mends mixups_by_hand soundness trials steps_by_hand bundle '
+    'touch_mistakes open_frames resting_joint',
+    'unseen': 'unseen_stretches chance folds order levels noise_and_interval steps_by_hand '
+    'touch_mistakes touches known_places tracker_beside fit many_small_errors',
+    'many': 'many_small_errors small_errors learned_priors needed_kinds',
+    'verdict': 'decision',
+    'levels': 'levels unseen_stretches',
+    'calibration': 'calibration formulas',
+    'advice': 'next_experiment pieces_by_hand next_touches actions',
+    'predicting': 'sizes planned dispersion posterior steps_by_hand',
+    'answer': 'standard_errors share_intervals contributions pieces_by_hand known_places '
+    'steps_by_hand tracker_beside',
 }
-"""What asks about the engine, folder by folder: files of tests that take a second or two at most.
-Other rooms are asked about by the files that import the modules drawn, and by folders of their name."""
+"""Which files of tests ask about a room of the engine before all others, by their names; most tests
+take less than a second. Rooms of other packages are asked about by the files that import the modules
+drawn, and by folders of their name."""
 EVERY = 'all'
 """What stands for the rooms of all packages."""
 QUICK = 'not slow and not cells'
@@ -68,8 +82,18 @@ FIRST = 'test_kept_answers'
 LONGEST = 30
 """Seconds of processor time after which a mutant that comes to no end is caught."""
 ALIKE = {
+    f'{ENGINE}.algebra.columns.rows_of: (np.diff(labels) >= 0).all() -> never': (
+        'rows that lie together are told one by one, and are the same'
+    ),
+    f'{ENGINE}.algebra.problem.Problem.features: 1 -> 2': 'makers of one more model are kept',
+    f'{ENGINE}.levels.free_form.Choosing.by_chance: 0 -> -1': (
+        'ways to divide the data have the same columns'
+    ),
     f'{ENGINE}.levels.free_form.Folds.of: np.diff(labels) >= 0 -> np.diff(labels) < 0': (
         'rows that lie fold by fold are sorted once more, to the same order'
+    ),
+    f'{ENGINE}.soundness.suspicions.turned_bases: 1.0 -> 1.25': (
+        'turns of axes onto axes are tens of degrees from where it counts'
     ),
 }
 """Mutants that nobody can see, each with the reason: they are set aside."""
@@ -171,7 +195,7 @@ def ways(node: ast.AST, *, within: bool) -> list[str]:
         return ['sign']
     if isinstance(node, ast.Call) and within:
         extreme = ['extreme'] if last_name(node.func) in EXTREMES else []
-        plain = [arg for arg in node.args if not isinstance(arg, ast.Starred)]
+        plain = {ast.dump(arg) for arg in node.args if not isinstance(arg, ast.Starred)}
         return extreme or (['exchanged'] if len(plain) == len(node.args) == 2 else [])
     if isinstance(node, ast.Constant) and movable(node.value):
         return ['less', 'more']
@@ -412,8 +436,8 @@ class Asked:
         except Exception as error:  # as an import would fail
             print(f'not put: {place}: {error!r}', flush=True)
             return 1
-        spent = 0.0
-        for seconds, ran, item in reach:
+        spent, own = 0.0, names_for(place)
+        for seconds, ran, item in sorted(reach, key=lambda each: each[2].path.stem not in own):
             inside = not isinstance(top, Function) or (file, first) in ran
             if inside and fails(item):
                 return 1
@@ -436,15 +460,10 @@ def fails(item: Any) -> bool:
             sys.stderr = kept
 
 
-def asking(rooms: Sequence[str], drawn: Sequence[Place]) -> list[str]:
-    """Return the files of tests that ask about drawn mutants of rooms."""
-    if rooms == [ENGINE]:
-        return [
-            str(file)
-            for folder, names in TESTS.items()
-            for name in names.split()
-            for file in sorted(Path(folder).glob(f'test_{name}.py'))
-        ]
+def asking(drawn: Sequence[Place]) -> list[str]:
+    """Return the files of tests that ask about drawn mutants."""
+    if all(place.module.startswith(f'{ENGINE}.') for place in drawn):
+        return [str(only(name)) for name in sorted(set().union(*map(names_for, drawn)))]
     wanted = {tuple(place.module.rsplit('.', 1)) for place in drawn}
     folders = {room_of(place).partition('.')[2] for place in drawn}
     out = []
@@ -457,6 +476,18 @@ def asking(rooms: Sequence[str], drawn: Sequence[Place]) -> list[str]:
         ):
             out.append(str(file))
     return out
+
+
+def names_for(place: Place) -> set[str]:
+    """Return the names of the files that ask about a place of the engine before others."""
+    inside = place.module.removeprefix(f'{ENGINE}.').split('.')[0]
+    return {f'test_{name}' for name in f'{WHOLE} {TESTS.get(inside, "")}'.split()}
+
+
+def only(name: str) -> Path:
+    """Return the one file of tests of a name."""
+    (file,) = (*Path('test').rglob(f'{name}.py'), *Path(CORE).rglob(f'{name}.py'))
+    return file
 
 
 def room_of(place: Place) -> str:
@@ -544,7 +575,7 @@ def main() -> int:
     drawn = drawn_from(every, args.draw, args.seed, in_turn=whole)
     asked = Asked(drawn, files, trees, args.jobs)
     options = ['-q', '-n', '0', '-p', 'no:cacheprovider', '--no-header', '-s', '-m', QUICK]
-    pytest.main([*options, *(args.tests or asking(rooms, drawn))], plugins=[asked])
+    pytest.main([*options, *(args.tests or asking(drawn))], plugins=[asked])
     return told(asked, args.least)
 
 

@@ -13,6 +13,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.soundness.base_change import rest_of
 from weld_twin_core.diagnosis.soundness.computed import _gap
+from weld_twin_core.diagnosis.soundness.efforts import efforts, with_sign
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
 from weld_twin_core.diagnosis.soundness.gate import Examined, _gave_way
 from weld_twin_core.diagnosis.soundness.images import _undone
@@ -35,6 +36,7 @@ from weld_twin_core.diagnosis.soundness.touches import _moved_run
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.features import with_expected_effort
 
 ELBOW = np.array([1.0, 1.0, np.degrees(1.0), 1.0, 1.0, 1.0])
 """Columns of joints, the elbow's in degrees."""
@@ -400,6 +402,37 @@ def test_of_one_recording_what_gave_way_is_for_the_search_to_weigh(ur5, still):
         'reflector_jumped'
     ]
     assert found.unsound_with([]) == ()
+
+
+# Efforts ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('holds', [True, False])
+def test_efforts_tell_whether_they_hold_the_load_and_what_nobody_said_that_hangs_there(rng, holds):
+    robot = load('ur10e')
+    heavy = replace(robot, payload_mass=robot.payload_mass + 3.0)
+    run = recorded(robot, stations(robot, rng, 40), rng, points=True)
+    # As a controller reports them, who may mean either; first they are taken for what holds.
+    effort = with_expected_effort(run, heavy, -1.0 if holds else 1.0).effort
+    (known,) = with_sign([replace(run, effort=effort)], robot)
+    assert known.effort_holds is holds
+    sign, difference = efforts(Case(*asked(robot, known)))
+    assert sign.level == 'note'
+    assert ('as what holds the load' in sign.sentence) is holds
+    assert difference.level == 'warning' and '+3.00 kg of payload' in difference.sentence
+    (agreed,) = efforts(Case(*asked(heavy, known)))
+    assert 'correlate by 1.00' in agreed.sentence
+    assert not efforts(Case(*asked(robot, run)))
+
+
+def test_efforts_in_another_unit_are_refused_with_what_it_may_be(rng):
+    robot = load('ur10e')
+    run = recorded(robot, stations(robot, rng, 40), rng, points=True)
+    effort = with_expected_effort(run, robot, -1.0).effort
+    for factor, words in ((1e3, 'N mm in the place of N m'), (30.0, 'per cent')):
+        wrong = replace(effort, value=factor * effort.value)
+        with pytest.raises(DataError, match=words):
+            with_sign([replace(run, effort=wrong)], robot)
 
 
 # What is believed -------------------------------------------------------------------------------

@@ -118,7 +118,7 @@ class _Site:
             if not (beside / DIAGNOSIS).is_file():
                 raise DataError('choose the diagnosis that it is to be corrected by, or drop one')
             job = replace(job, names=names)
-            self._refuse_corrected(job)
+            await run_in_threadpool(self._refuse_corrected, job)
             asked_form = {**form, 'robot': robot or form.get('robot', '')}
             asked = asked_of_program(asked_form, sorted(file.name for file in beside.iterdir()))
             await run_in_threadpool(self._queue.add, job.ask(asked))

@@ -26,8 +26,6 @@ from weld_twin_lab.plant.plant import run
 from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
-pytestmark = pytest.mark.drawn
-
 NOISE, TOLERANCE, STATIONS = 3e-5, 2e-4, 16
 
 
@@ -41,9 +39,10 @@ def _with_middle_frames(robot, step):
     return robot.with_frames(base=base, tool=tool)
 
 
-def test_a_corrected_arm_keeps_what_its_plan_promised():
+@pytest.mark.parametrize(('arm', 'seed'), [('ur5', 11), ('kuka_kr6_r900', 12)])
+def test_a_corrected_arm_keeps_what_its_plan_promised(arm, seed):
     """Measured at the stations of the plan, corrected, and driven where it never was."""
-    robot, rng = catalog.load('ur5'), np.random.default_rng(11)
+    robot, rng = catalog.load(arm), np.random.default_rng(seed)
     flaws = small_errors(robot, rng)
 
     def driven(q, noise):

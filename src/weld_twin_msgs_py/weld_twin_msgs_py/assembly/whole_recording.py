@@ -37,6 +37,9 @@ NEAR = 0.2
 """Share of such a jump from which it came back: each of two arms moves on little between two states."""
 STRAY = 2
 """Joint states that a driver may garble."""
+EVERY_OTHER, NEARLY_ALL = 0.4, 0.9
+"""Share of the jumps that come back: of two arms in turn each second one does, less what falls out; of
+stations all do, less a tenth, for an arm may go home now and then."""
 AT_REST = 0.01
 """Speed [rad/s or m/s] that controllers still tell of an arm that stands."""
 TOGETHER = 0.1
@@ -93,7 +96,7 @@ def _refuse_two_arms(name: str, robot: Robot, motion: JointMotion, *, stations: 
     first, last = jumps[:-1], jumps[1:] + 1
     near = away(first, last).max(axis=1) < NEAR * way[first].max(axis=1)
     back = int((near & (motion.t[last] - motion.t[first] < SPARSE)).sum())
-    if back > max(STRAY, (0.9 if stations else 0.4) * first.size):
+    if back > max(STRAY, (NEARLY_ALL if stations else EVERY_OTHER) * first.size):
         raise DataError(
             f'the joint states of {name} jump to another posture and back {back} times, faster than '
             'the arm moves: two publishers share their topic, such as those of two arms, or a '

@@ -37,7 +37,7 @@ LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
-_SPEEDS = tuple((0.5 ** np.arange(3)).tolist())
+_SPEEDS = (1.0, 0.5, 0.25)
 """Of paths, as shares of the fastest."""
 _LONGEST = 40.0
 """Time [s] of a recorded seam that is run again, backward or slower: half the least experiment."""

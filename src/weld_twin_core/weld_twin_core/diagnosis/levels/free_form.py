@@ -25,7 +25,7 @@ from ..unseen.unseen_stretches import Base, Unseen
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""
-RIDGES = tuple(np.geomspace(1e-1, 1e3, 3).tolist())
+RIDGES = (1e-1, 1e1, 1e3)
 """Prior precision of the columns of a group in units of noise: from free to hardly there."""
 MOST = 6
 """More groups than this at once say that nothing simple is at work."""

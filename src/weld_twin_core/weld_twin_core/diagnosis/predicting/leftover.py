@@ -38,7 +38,7 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 ROUGH = 0.5
 """Share of small errors of a usual size from which on all that is left is the arm's. A judgement: of two
 real arms under a tracker it is 0.3 to 0.6, and their stations repeat better than models predict."""
-NEIGHBOURS = tuple((2 * 4 ** np.arange(4)).tolist())
+NEIGHBOURS = (2, 8, 32, 128)
 """Samples that are looked at together for what they have in common: two show what changes from one to
 the next, a hundred what is a tenth of the noise."""
 AGREED = 2.5

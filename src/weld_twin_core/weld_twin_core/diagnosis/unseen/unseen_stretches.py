@@ -37,7 +37,7 @@ from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 ROUNDED = 1e-13
 """Share of a column's sum of squares that is rounding once a stretch is taken off it: some hundred
 times what one difference of doubles loses."""
-RIDGES = tuple(np.geomspace(1e-2, 1e4, 4).tolist())
+RIDGES = (1e-2, 1.0, 1e2, 1e4)
 """Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""

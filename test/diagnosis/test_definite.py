@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import LinAlgError
 
-from weld_twin_core.diagnosis.algebra.definite import inverted, solved, well_conditioned
+from weld_twin_core.diagnosis.algebra.definite import inverted, solved, span_of, well_conditioned
 
 
 def definite(count, least=0.1):
@@ -36,3 +36,14 @@ def test_what_is_not_definite_is_refused_and_what_is_nearly_not_is_told():
         solved(matrix.copy(), np.ones(20))
     with pytest.raises(LinAlgError):
         inverted(matrix)
+
+
+def test_a_span_knows_neither_the_size_of_columns_nor_their_copies():
+    one, other = np.random.default_rng(3).normal(size=(2, 9))
+    columns = np.array([1e-9 * one, 0.0 * one, 1e6 * (other + one), one - 1e-14 * other])
+    span = span_of(columns)
+    assert span.shape == (2, 9)
+    np.testing.assert_allclose(span @ span.T, np.eye(2), atol=1e-12)
+    for column in (one, other):
+        np.testing.assert_allclose(column @ span.T @ span, column, atol=1e-9)
+    assert span_of(0.0 * columns).shape == span_of(columns[:0]).shape == (0, 9)

@@ -15,7 +15,7 @@ from weld_twin_core.diagnosis.algebra.open_directions import shown
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.answer.named_effects import _along, _parted
 from weld_twin_core.diagnosis.frames.alignment import chord
-from weld_twin_core.diagnosis.predicting.leftover import _shared
+from weld_twin_core.diagnosis.predicting.leftover import _shared, _ways
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
 from weld_twin_core.diagnosis.soundness.efforts import _Loads
@@ -216,3 +216,11 @@ def test_effects_move_the_tool_along_with_all_of_them_and_have_parts_of_that():
         expected = [float((one * (alone[0] + alone[1])).sum()) for one in alone]
         assert row == pytest.approx(expected, rel=5e-3)
     assert _parted(np.array([[3.0, 1.0], [2.0, -1.0]])).tolist() == [[0.75, 0.25], [1.0, 0.0]]
+
+
+def test_ways_in_which_rows_may_be_off_add_up_to_their_covariance():
+    rng = np.random.default_rng(8)
+    root, columns = rng.normal(size=(4, 4)) * [1e-3, 1.0, 50.0, 1.0], rng.normal(size=(4, 7))
+    covariance = root.T @ root
+    ways = _ways(covariance, columns)
+    np.testing.assert_allclose(ways.T @ ways, columns.T @ covariance @ columns, rtol=1e-4)

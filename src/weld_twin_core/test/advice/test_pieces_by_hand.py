@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, candidates
+from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, _alone, candidates
 from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns, _longer
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
 from weld_twin_core.diagnosis.advice.next_touches import MOST, _Option
 from weld_twin_core.diagnosis.advice.postures import Limits, Room, joined, widened
-from weld_twin_core.diagnosis.advice.separation import Parting, _ahead
+from weld_twin_core.diagnosis.advice.separation import Parting, _ahead, _remainder
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.answer.next_step import _in_place, _promise
 from weld_twin_core.effects import Backlash, JointCompliance, JointOffset
@@ -58,6 +58,17 @@ def test_a_difference_that_the_other_explanation_can_make_parts_nothing(rng):
     stack[-1] = stack[0] - 2.0 * stack[1]
     parting = Parting([stack @ stack.T] * 2, [np.array([stack @ stack.T])] * 2)
     assert parting.before.max() < 1e-3 * np.linalg.norm(stack[-1])
+
+
+def test_what_rounding_leaves_of_one_difference_does_not_touch_that_of_another(rng):
+    stack = rng.normal(size=(3, 40))
+    square = stack @ stack.T
+    copied = np.array(square)
+    copied[2], copied[:, 2] = square[1], square[:, 1]
+    # A little less than its own projection, as rounding may have it.
+    copied[2, 2] = (1.0 - 1e-6) * square[1, 1]
+    told = _remainder(np.array([square, copied]))
+    assert told == pytest.approx([left(stack), 0.0], rel=1e-6)
 
 
 @pytest.mark.parametrize(('static', 'telling'), [(True, 60), (False, 40)])
@@ -165,6 +176,20 @@ def test_a_way_takes_as_long_as_half_of_speed_or_of_acceleration_asks(problem, w
     assert max(shares) == pytest.approx(0.5, rel=0.1) and max(shares) < 0.501
     np.testing.assert_allclose(made.q[[0, -1]], [room.home] * 2, atol=1e-12)
     assert np.abs(made.q - stops[1]).sum(axis=1).min() < 1e-9
+
+
+def test_a_way_that_is_not_free_leads_by_home_and_one_joint_alone_goes_as_far_as_it_may():
+    home, q = np.zeros(2), np.array([[1.0, 1.0], [2.0, 1.0], [-1.0, 0.5], [1.0, 0.5]])
+    room = SimpleNamespace(home=home, low=np.array([-1.0, -2.0]), high=np.array([1.5, 1.0]))
+    # Nobody may pass from one side to the other.
+    room._ways = lambda start, end: start[:, 0] * end[:, 0] > 0.0
+    expected = [q[0], q[1], home, q[2], home, q[3]]
+    np.testing.assert_array_equal(Room.linked(room, q), expected)
+    for most, share in ((2.0, 1.0), (0.8, 0.5), (0.01, 0.1)):
+        room.way = lambda stops, most=most: np.abs(stops).max() <= most
+        high, low = share * room.high[0], share * room.low[0]
+        expected = [home, [high, 0.0], [low, 0.0], home]
+        np.testing.assert_allclose(_alone(room, 0), expected)
 
 
 def test_joints_stay_within_their_limits_and_near_what_was_recorded(problem):

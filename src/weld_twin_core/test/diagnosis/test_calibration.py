@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.calibration.calibrated import Stated, Statement, calibrated, stated
+from weld_twin_core.diagnosis.calibration.calibrated import (
+    Stated,
+    Statement,
+    _led,
+    calibrated,
+    stated,
+)
 from weld_twin_core.diagnosis.calibration.features import (
     KINDS,
     faint,
@@ -240,3 +246,12 @@ def test_a_set_over_several_places_is_sure_of_none_of_them():
     for levels in (dict(told.place), dict(told.dependence)):
         assert all(0.45 <= p <= 0.55 for p in levels.values())
         assert sum(levels.values()) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(('first', 'others'), [(0.8, (0.12, 0.08)), (0.25, (0.25, 0.25))])
+def test_others_share_what_the_first_leaves_as_before_and_none_is_likelier_than_it(first, others):
+    told = _led((('a', 0.5), ('b', 0.3), ('c', 0.2)), first)
+    assert [key for key, _ in told] == ['a', 'b', 'c']
+    # Of 0.75 three fifths would be 0.45, which is more than the first has.
+    assert [value for _, value in told] == pytest.approx([first, *others])
+    assert _led((), 0.4) == () and _led((('a', 1.0), ('b', 0.0)), 0.6)[1] == ('b', 0.0)

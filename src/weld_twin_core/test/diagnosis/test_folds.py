@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.unseen.folds import gain, jackknife
+from weld_twin_core.diagnosis.unseen.folds import gain, growth, jackknife
 
 
 def test_a_gain_counts_parts_and_not_samples():
@@ -29,3 +29,11 @@ def test_leaving_one_out_gives_the_variance_of_a_mean():
     values = np.array([1.0, 4.0, -2.0, 3.0, 0.5])
     tries = np.array([np.delete(values, k).mean() for k in range(values.size)])
     assert jackknife(tries) == pytest.approx(values.var(ddof=1) / values.size)
+
+
+def test_an_error_grows_by_what_it_does_and_falls_only_where_that_is_no_chance():
+    before = np.array([1.0, 1.0, 4.0, 4.2, 1.0, 3.0, 9.0])
+    after = np.array([4.0, 4.0, 1.0, 1.1, 3.0, 0.5, 16.0])
+    parts = np.array([0, 0, 1, 1, 2, 2, 3])
+    expected = [1.0, np.sqrt(2.1 / 8.2) - 1.0, 0.0, 1.0 / 3.0]
+    np.testing.assert_allclose(growth(before, after, parts), expected)

@@ -8,7 +8,7 @@ from measured_cells import anywhere, asked, moving, recorded, remeasured, statio
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import nearest_rotation, rotation_matrix
-from weld_twin_core.diagnosis.frames.alignment import initial_frames
+from weld_twin_core.diagnosis.frames.alignment import LEVER, Track, initial_frames
 
 
 def worst_median(problem, model):
@@ -76,3 +76,17 @@ def test_the_nearest_rotation_of_a_rotation_is_itself_and_never_a_mirror(rng):
     turn = rotation_matrix(rng.normal(size=3))
     np.testing.assert_allclose(nearest_rotation(turn), turn, atol=1e-12)
     assert np.linalg.det(nearest_rotation(np.diag([1.0, 1.0, -1.0]))) == pytest.approx(1.0)
+
+
+def test_a_gap_is_how_far_the_tool_is_from_where_it_was_seen_and_a_turn_by_its_lever(rng):
+    base, tool = anywhere(rng, 2.0), anywhere(rng, 0.2)
+    flange = [anywhere(rng, 1.0) for _ in range(5)]
+    seen = np.array([base @ each @ tool for each in flange])
+    turn = np.array([each[:3, :3] for each in flange])
+    point = np.array([each[:3, 3] for each in flange])
+    position = seen[:, :3, 3] + np.array([2e-3, -1e-3, 2e-3])
+    points = Track(position, None, point, turn)
+    np.testing.assert_allclose(points.gap(base, tool), 3e-3, rtol=1e-9)
+    turned = rotation_matrix([0.0, 0.0, 0.01]) @ seen[:, :3, :3]
+    both = Track(position, turned, point, turn)
+    np.testing.assert_allclose(both.gap(base, tool), 3e-3 + 0.01 * LEVER, rtol=1e-4)

@@ -57,21 +57,21 @@ TESTS = {
     'hypotheses': 'impossible_effects swapped_alternatives carrying needed_kinds unseen_stretches',
     'frames': 'alignment changes known_places touches steps_by_hand',
     'soundness': 'alignment checks_by_hand mends mixups_by_hand soundness trials steps_by_hand bundle '
-    'touch_mistakes open_frames resting_joint',
-    'unseen': 'unseen_stretches chance folds order levels noise_and_interval steps_by_hand '
+    'touch_mistakes',
+    'unseen': 'unseen_stretches chance folds levels noise_and_interval steps_by_hand '
     'touch_mistakes touches known_places tracker_beside fit many_small_errors',
     'many': 'many_small_errors small_errors learned_priors needed_kinds',
     'verdict': 'decision',
     'levels': 'levels unseen_stretches',
     'calibration': 'calibration formulas',
     'advice': 'next_experiment pieces_by_hand next_touches actions',
-    'predicting': 'sizes planned dispersion posterior steps_by_hand',
+    'predicting': 'sizes planned dispersion steps_by_hand',
     'answer': 'standard_errors share_intervals contributions pieces_by_hand known_places '
     'steps_by_hand tracker_beside',
 }
-"""Which files of tests ask about a room of the engine before all others, by their names; most tests
-take less than a second. Rooms of other packages are asked about by the files that import the modules
-drawn, and by folders of their name."""
+"""Which files of tests ask about a room of the engine before all others, by their names. Rooms of
+other packages are asked about by the files that import the modules drawn, and by folders of their
+name."""
 EVERY = 'all'
 """What stands for the rooms of all packages."""
 QUICK = 'not slow and not cells'

@@ -47,6 +47,8 @@ LOOSE = 100.0
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
 FIELD = 3 * 9
 """Columns of a smooth field: every coordinate over the place, up to its squares."""
+FALLEN = 3
+"""Columns of a loose tool: to either side along each of its axes."""
 GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
 """Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
 what takes a tenth of a radian to build up."""
@@ -226,7 +228,8 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(maker) for maker in features], ()
     elif not problem.untracked and features[0].view.robot.gravity.any():
-        yield 'tool', 'load', [_hanging(maker) for maker in features], ()
+        for hanging in zip(*map(_hanging, features), strict=True):
+            yield 'tool', 'load', list(hanging), ()
     if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
         yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
@@ -288,24 +291,24 @@ def _yielding(maker: Features) -> Array:
     return out
 
 
-def _hanging(maker: Features) -> Array:
+def _hanging(maker: Features) -> tuple[Array, Array]:
     """
-    Return the tool pushed along its axes by what hangs on it, shape (12, 6, M).
+    Return the tool pushed along its axes by what hangs on it, shapes (9, 6, M) and (3, 6, M).
 
-    A bracket sags, along any axis of the tool by how far down each of its axes points; and a loose
-    tool falls along each axis to the side that is lower, by as much however low it is.
+    A bracket sags, along any axis of the tool by how far down each of its axes points. A loose tool
+    falls along each axis to the side that is lower, by as much however low it is.
     """
     poses = maker.run.poses
     # A tool that no joint turns has one rotation for all samples.
     rotation = np.broadcast_to(poses.rotation, (*poses.position.shape, 3))
     down = np.asarray(maker.view.frames.root_rotation @ maker.view.robot.gravity)
     weight = np.einsum('mji,mj->mi', rotation, np.broadcast_to(down, rotation.shape[:2]))
-    out = np.zeros((3, 4, 6, len(rotation)))
+    sagging, fallen = np.zeros((3, 3, 6, len(rotation))), np.zeros((FALLEN, 6, len(rotation)))
     for axis in range(3):
         way = rotation[:, :, axis].T
-        out[axis, :3, :3] = weight.T[:, None] * way
-        out[axis, 3, :3] = np.sign(weight[:, axis]) * way
-    return out.reshape(12, 6, -1)
+        sagging[axis, :, :3] = weight.T[:, None] * way
+        fallen[axis, :3] = np.sign(weight[:, axis]) * way
+    return sagging.reshape(9, 6, -1), fallen
 
 
 def _leaning(maker: Features) -> Array:

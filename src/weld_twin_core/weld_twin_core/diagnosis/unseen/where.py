@@ -10,7 +10,7 @@ model, the residual has structure, and the groups that bring it say what it depe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ..evidence import Search
 from ..result import Cause, Structure, Where
 from .chance import Candidates, chance_gain, may_be_chance
 from .folds import Gain
-from .groups import FIELD, FINE, KNOTS, Group, all_groups
+from .groups import FALLEN, FIELD, FINE, KNOTS, Group, all_groups
 from .unseen_stretches import RIDGES, Unseen
 
 REGRESSORS = {
@@ -159,6 +159,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     joints = model.robot.joint_names
     # Where no instrument measured, and nothing shows where the base stands, joints alone are reported.
     elsewhere = problem.placed or not problem.untracked
+    named = {effect.traits.place for effect in model.found}
     for group in all_groups(problem, model, unseen.scale):
         if group.at in joints:
             after = first.errors(first.extended(group.columns, RIDGES[1:2])[0]).sum()
@@ -166,7 +167,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
             waves = group.on == 'angle' and len(group.columns) == FINE
             key = group.at, 'waves' if waves else group.on
             of_gap[key] = max(of_gap.get(key, 0.0), float(1.0 - after / max(before, EMPTY)))
-        if _tells(group, at_joint=group.at in joints) and (elsewhere or group.at in joints):
+        if _tells(group, joints, named) and (elsewhere or group.at in joints):
             found.append((base.gain(group.columns), group))
     if not found:
         return Structure(unseen.rms(unseen.whole), 0.0, 0.0, (), of_gap=of_gap)
@@ -182,7 +183,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
     if counts and may_be_chance(unseen.residual.size, best.share):
         every = all_groups(problem, model, unseen.scale)
-        each = (g.columns for g in every if _tells(g, at_joint=g.at in joints))
+        each = (g.columns for g in every if _tells(g, joints, named))
         tried = Candidates(
             unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
         )
@@ -190,14 +191,19 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     return Structure(best.rms_m, best.share, best.steady, names, chance, of_gap, of_rest)
 
 
-def _tells(group: Group, *, at_joint: bool) -> bool:
-    """Return whether a group is one of the few that show what is left: the widest of their kind."""
+def _tells(group: Group, joints: Collection[str], named: Collection[str]) -> bool:
+    """
+    Return whether a group is one of the few that show what is left: the widest of their kind.
+
+    named: places of the effects found. Where a sag of the tool is one, a loose tool is beside it.
+    """
+    at_joint = group.at in joints
     if group.on == 'angle' and at_joint:
         return len(group.curves) == 1 and len(group.columns) == KNOTS['angle']
     if group.on == 'direction':
         return not group.curves
     return not at_joint and (
         group.on == 'time'
-        or group.at == 'tool'
         or (group.on, len(group.columns)) == ('place', FIELD)
+        or (group.at in named and len(group.columns) == FALLEN)
     )

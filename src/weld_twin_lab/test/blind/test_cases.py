@@ -16,7 +16,7 @@ from weld_twin_core.effects import REGISTRY, effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.blind.ambiguous import CONSTRUCTIONS, construct
-from weld_twin_lab.blind.cause_sizes import FAMILIES, OUTSIDE, SIZES, draw, scaled
+from weld_twin_lab.blind.cause_sizes import FAMILIES, OUTSIDE, SIZES, draw, machines, scaled
 from weld_twin_lab.blind.deck import KINDS, STRATA, Lot, lots
 from weld_twin_lab.blind.displacement import correlation, rigid, rms
 from weld_twin_lab.blind.recorded_motion import motion
@@ -43,6 +43,12 @@ SIGMA = 2e-5
 @pytest.fixture(scope='module')
 def robot():
     return catalog.load('ur5')
+
+
+def test_every_size_that_is_drawn_ends_where_machines_end(robot):
+    for family in FAMILIES:
+        cause = {'effect': family, 'joint': 'elbow_joint'}
+        assert np.isfinite([machines(robot, cause, size) for size in SIZES[family]]).all(), family
 
 
 @pytest.fixture(scope='module')

@@ -8,7 +8,7 @@ from plant_cells import UR5, dh_links, dh_positions, record, stations
 from scipy.spatial.transform import Rotation
 
 LEVER = np.array([0.0, 0.06, 0.3])
-SAG = {'effect': 'tool_sag', 'bend': 1e-3, 'lever': LEVER.tolist()}
+SAG = {'effect': 'tool_sag', 'bend': 1e-3 * np.linalg.norm(LEVER), 'lever': LEVER.tolist()}
 
 
 def test_a_torch_sags_by_its_bend_where_it_is_level_and_by_nothing_where_it_hangs():

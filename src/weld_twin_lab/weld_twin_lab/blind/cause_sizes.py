@@ -41,7 +41,7 @@ INSIDE = 0.8
 TWINS = {
     ('bearing_tilt', 'tilt'): 'lean',
     ('hose_pull', 'tension'): 'force',
-    ('tool_sag', 'bend'): 'turn',
+    ('tool_sag', 'bend'): 'sag',
 }
 """What the twin calls the size of a cause, where it is another word."""
 LONG = 0.1
@@ -235,7 +235,7 @@ def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
 
 def _sag(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     """Return a torch that stands aside of its bracket, as most do."""
-    return {'bend': 1e-3, 'lever': [*rng.uniform(-0.1, 0.1, 2), float(rng.uniform(0.15, 0.35))]}
+    return {'bend': 2.5e-4, 'lever': [*rng.uniform(-0.1, 0.1, 2), float(rng.uniform(0.15, 0.35))]}
 
 
 def _quadratic(robot: Robot, span: float, rng: np.random.Generator) -> Cause:

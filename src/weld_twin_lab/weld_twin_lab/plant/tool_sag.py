@@ -20,15 +20,16 @@ def tool_sag(entry: Entry, here: Here) -> np.ndarray:
     """
     Return how the torch has turned about its bracket, and its tip with it.
 
-    bend: turn of the bracket [rad] where the torch is level.
+    bend: way of the tip [m] where the torch is level.
     lever: from the bracket to the tip, in the tool frame, shape (3,) [m].
     """
     lever = np.asarray(entry['lever'], dtype=float)
-    soft = float(entry['bend']) * np.array([1.0, 1.0 - FLAT * here.richness, 1.0])
+    length = np.linalg.norm(lever)
+    soft = float(entry['bend']) / length * np.array([1.0, 1.0 - FLAT * here.richness, 1.0])
     flange = exponentials.flange(here.arm, exponentials.home(here.arm), here.q)
     weight = -screws.compose(flange, here.arm.tool).rotation[..., 2, :]
     turn = np.zeros((len(here.q), 3))
     for _ in range(ROUNDS):
         bar = Rotation.from_rotvec(turn).apply(lever)
-        turn = soft * np.cross(bar / np.linalg.norm(lever), weight)
+        turn = soft * np.cross(bar / length, weight)
     return np.hstack([Rotation.from_rotvec(turn).apply(lever) - lever, turn])

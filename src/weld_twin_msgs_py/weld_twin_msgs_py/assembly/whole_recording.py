@@ -29,8 +29,6 @@ SPARSE = 0.5
 """Joint states further apart than this [s] say nothing of the motion between them."""
 FAST = 10.0
 """Speed [rad/s or m/s] no arm reaches, for robots whose limits are not known."""
-
-
 JUMP = 0.1
 """Joint states nearer than this [rad or m] may be late ones of the same arm."""
 NEAR = 0.2

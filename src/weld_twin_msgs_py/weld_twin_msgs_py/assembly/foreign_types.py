@@ -40,11 +40,7 @@ def _pose_of_transform(message: Any, frame: str) -> Iterator[Any]:
 
 
 def _poses_of_tf(message: Any, frame: str) -> Iterator[Any]:
-    """
-    Yield the pose of one child frame out of many.
-
-    Raises DataError: no frame is named: which of them was measured, nobody knows.
-    """
+    """Yield the pose of one child frame out of many."""
     if not frame:
         children = ', '.join(sorted({each.child_frame_id for each in message.transforms}))
         raise DataError(
@@ -55,11 +51,7 @@ def _poses_of_tf(message: Any, frame: str) -> Iterator[Any]:
 
 
 def _pose_of_rigid_bodies(message: Any, name: str) -> Iterator[Any]:
-    """
-    Yield the pose of one body that a motion capture system sees; of the only one if none is named.
-
-    Raises DataError: there are several, and none is named.
-    """
+    """Yield the pose of one body that a motion capture system sees; of the only one if none is named."""
     bodies = message.rigidbodies
     if not name and len(bodies) > 1:
         seen = ', '.join(sorted(body.rigid_body_name for body in bodies))
@@ -73,11 +65,7 @@ def _pose_of_rigid_bodies(message: Any, name: str) -> Iterator[Any]:
 
 
 def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
-    """
-    Yield the joint state of a `JointTrajectoryControllerState`: what was commanded.
-
-    Raises DataError: the part that is named is none of the message.
-    """
+    """Yield the joint state of a `JointTrajectoryControllerState`: what was commanded."""
     name = part or ('reference' if hasattr(message, 'reference') else 'desired')
     point = getattr(message, name, None)
     if point is None or not hasattr(point, 'positions'):
@@ -91,11 +79,7 @@ def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
 
 
 def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
-    """
-    Yield the joint state of a `DynamicJointState`; a joint without a position is left out.
-
-    Raises DataError: names and values are not as many.
-    """
+    """Yield the joint state of a `DynamicJointState`; a joint without a position is left out."""
     if len(message.joint_names) != len(message.interface_values) or any(
         len(each.interface_names) != len(each.values) for each in message.interface_values
     ):
@@ -183,8 +167,6 @@ def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
 
     kind: its type.
     part: the child frame of a transform, or the part of a controller's state, that is meant.
-
-    Raises DataError: it does not hold what is looked for.
     """
     turn = FOREIGN.get(kind)
     return (message,) if turn is None else tuple(turn(message, part))

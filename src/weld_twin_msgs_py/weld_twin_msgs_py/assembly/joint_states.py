@@ -97,8 +97,6 @@ def names_called(
     Return what joint states call the joints of a robot; None where nothing is said of it.
 
     called: joints of the robot, and what they are called behind the prefix.
-
-    Raises ModelError: a joint is none of the robot's, or two would be called alike.
     """
     given = called or {}
     if not prefix and not given:
@@ -301,11 +299,7 @@ class JointStates:
         return True
 
     def _take_prefix(self, names: Sequence[str]) -> bool:
-        """
-        Take the names of a message for the robot's own with one prefix, if they are.
-
-        Raises DataError: there are several prefixes: those of several robots.
-        """
+        """Take the names of a message for the robot's own with one prefix, if they are."""
         if self._given or self._usual is not None or self._spread:
             return False  # the names are known: these are the joints of another robot
         prefixes = set.intersection(

@@ -151,8 +151,6 @@ def assembled(
     static: whether the joint states are stations at rest; None looks at the stamps.
     one_clock: refuse measurements that have no time in common with the joint states.
     notes: what is to be said of the streams.
-
-    Raises DataError: the streams have no time in common, or numbers that cannot be used.
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])

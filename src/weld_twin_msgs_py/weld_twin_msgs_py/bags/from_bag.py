@@ -40,12 +40,7 @@ class Mark(NamedTuple):
 
 
 def marks(bag: BagReader, names: TopicNames) -> list[Mark]:
-    """
-    Return the contacts of a bag, in the order of their stamps; none where it holds none.
-
-    Raises DataError: a contact has no label or no stamp, two have the same stamp, or the topic is
-    of another type.
-    """
+    """Return the contacts of a bag, in the order of their stamps; none where it holds none."""
     kind, count = bag.topics.get(names.contact, ('', 0))
     if not count:
         return []
@@ -75,8 +70,6 @@ def marks(bag: BagReader, names: TopicNames) -> list[Mark]:
 def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) -> Recording:
     """
     Return the recording as stations, one for every contact.
-
-    Raises DataError: a contact lies outside the joint states, or is not in the artefact.
 
     recording: with the joint states, as they came.
     made: how the bag was made; may hold the artefact. Without one every label is a point, or a

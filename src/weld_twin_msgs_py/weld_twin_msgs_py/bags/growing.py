@@ -70,11 +70,7 @@ class GrowingBag:
         self._lock = -1
 
     def open(self) -> GrowingBag:
-        """
-        Start the bag.
-
-        Raises DataError: something of that name exists, or the place cannot be written.
-        """
+        """Start the bag."""
         self._refuse_existing()
         with clear_write_errors(self.path):
             self.folder.mkdir(parents=True)
@@ -85,11 +81,7 @@ class GrowingBag:
         return self
 
     def note(self, key: str, value: Any) -> None:
-        """
-        Add to the provenance of the open bag, or change it.
-
-        Raises DataError: the disk refuses.
-        """
+        """Add to the provenance of the open bag, or change it."""
         self._provenance[key] = value
         with self._clear_errors():
             self._write_notes()
@@ -99,11 +91,7 @@ class GrowingBag:
         self._channels[channel.topic, channel.type] = channel
 
     def write_cdr(self, topic: str, kind: str, data: bytes, log_ns: int) -> None:
-        """
-        Write a serialised message, as a raw subscription receives it.
-
-        Raises DataError: the bag is not open, or the disk refuses.
-        """
+        """Write a serialised message, as a raw subscription receives it."""
         segments = self._opened()
         with self._clear_errors():
             if self._full(segments, log_ns):
@@ -112,21 +100,13 @@ class GrowingBag:
             segments.write(channel, data, log_ns)
 
     def flush(self) -> None:
-        """
-        Put what was written on the disk, where it outlives this process and a power cut.
-
-        Raises DataError: the bag is not open, or the disk refuses.
-        """
+        """Put what was written on the disk, where it outlives this process and a power cut."""
         segments = self._opened()
         with self._clear_errors():
             segments.growing.flush()
 
     def close(self) -> None:
-        """
-        Finish the bag and give it its name; what cannot be finished stays as it is.
-
-        Raises DataError: something of that name has appeared meanwhile, or the disk refuses.
-        """
+        """Finish the bag and give it its name; what cannot be finished stays as it is."""
         if self._segments is None:
             return
         try:
@@ -196,11 +176,7 @@ def is_growing(folder: Path) -> bool:
 
 
 def lock(folder: Path) -> int:
-    """
-    Return a descriptor that holds a directory; the end of the process lets go of it.
-
-    Raises DataError: another process holds it.
-    """
+    """Return a descriptor that holds a directory; the end of the process lets go of it."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -232,8 +208,6 @@ class BackgroundBag:
     bag: this opens and closes it.
     flush_every: longest time a message is only in memory while the disk keeps up [s].
     most_bytes: memory the queue may take.
-
-    Raises TwinError: the bag cannot be opened.
     """
 
     def __init__(self, bag: GrowingBag, *, flush_every: float, most_bytes: int) -> None:
@@ -292,11 +266,7 @@ class BackgroundBag:
         return not self._thread.is_alive()
 
     def close(self) -> None:
-        """
-        Write what waits and finish the bag.
-
-        Raises TwinError: it could not all be written.
-        """
+        """Write what waits and finish the bag."""
         self.end()
         self._thread.join(CLOSED_WITHIN)
         if self._thread.is_alive():

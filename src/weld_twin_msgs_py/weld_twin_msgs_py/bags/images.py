@@ -29,11 +29,7 @@ READ: Mapping[str, Callable[[Any], np.ndarray | Marks]] = {
 
 
 def images(bag: BagReader, names: TopicNames) -> list[Image]:
-    """
-    Return the images of a bag, in the order of their stamps; none where it holds none.
-
-    Raises DataError: the topic is of another type, or a message has no stamp or no such fields.
-    """
+    """Return the images of a bag, in the order of their stamps; none where it holds none."""
     kind, count = bag.topics.get(names.images, ('', 0))
     if not count:
         return []
@@ -56,8 +52,6 @@ def looking(
 ) -> Recording:
     """
     Return the recording with poses that its images tell.
-
-    Raises DataError: a camera, a target or a point is not described, or the images tell no poses.
 
     recording: with the joint states.
     names: may describe cameras and targets.

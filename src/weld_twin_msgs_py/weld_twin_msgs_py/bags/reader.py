@@ -57,8 +57,6 @@ def unzstd(data: bytes, size: int | None = None) -> bytes:
     """
     Return the content of a zstd frame.
 
-    Raises DataError: it is larger than declared or than can be meant.
-
     size: what is declared beside it.
     """
     limit = _limit(data, size)
@@ -72,11 +70,7 @@ def unlz4(data: bytes, size: int | None = None) -> bytes:
 
 
 def unpack_file(packed: Path, out: Path) -> None:
-    """
-    Unpack a zstd file.
-
-    Raises DataError: it holds more than can be meant, or than there is room for.
-    """
+    """Unpack a zstd file."""
     most = max(SMALL, RATIO * packed.stat().st_size)
     free = shutil.disk_usage(out.parent).free
     with packed.open('rb') as raw:
@@ -190,32 +184,20 @@ class BagReader:
         self._stack.close()
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """
-        Yield the messages of some topics, in the order of recording.
-
-        Raises DataError: the bag turns out to be damaged on the way.
-        """
+        """Yield the messages of some topics, in the order of recording."""
         with clear_errors(self.path):
             for topic, kind, log_ns, data in self.raw(topics):
                 yield BagMessage(topic, kind, log_ns, self.decoded(data, kind))
 
     def decoded(self, data: bytes, kind: str) -> Any:
-        """
-        Return a message by the definition of Jazzy, or by that of the bag where Jazzy has none.
-
-        Raises DataError: nobody says what such a message is.
-        """
+        """Return a message by the definition of Jazzy, or by that of the bag where Jazzy has none."""
         if kind in TYPES.fielddefs:
             return decode(data, kind)
         definition, idl = self._definitions.get(kind, ('', False))
         return decode(data, kind, types_with(kind, definition, idl))
 
     def raw(self, topics: Collection[str]) -> Iterator[tuple[str, str, int, bytes]]:
-        """
-        Yield topic, type, time of recording [ns] and serialised message of some topics.
-
-        Raises DataError: the bag turns out to be damaged on the way.
-        """
+        """Yield topic, type, time of recording [ns] and serialised message of some topics."""
         with clear_errors(self.path):
             for reader in self._readers:
                 wanted = [c for c in reader.connections if c.topic in topics]
@@ -230,8 +212,6 @@ class BagReader:
         Yield topic, stamp [ns] and whether it is the header's, of every message, undecoded.
 
         A message without a header, or of an unknown type, gives the time of its recording.
-
-        Raises DataError: the bag turns out to be damaged on the way.
         """
         with clear_errors(self.path):
             for reader in self._readers:

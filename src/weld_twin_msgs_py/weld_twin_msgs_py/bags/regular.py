@@ -73,11 +73,7 @@ class Stream:
         self._values.frombytes(np.ascontiguousarray(rows, dtype=np.float64).tobytes())
 
     def leave_out(self, error: DataError) -> None:
-        """
-        Count a message that gives no sample, by what is wrong with it.
-
-        Raises DataError: its stamp is so far behind that the clock was set.
-        """
+        """Count a message that gives no sample, by what is wrong with it."""
         if isinstance(error, Unstamped):
             self._unstamped += 1
         elif isinstance(error, Late):
@@ -98,11 +94,7 @@ class Stream:
         )
 
     def samples(self) -> Samples:
-        """
-        Return the samples.
-
-        Raises DataError: there are none; the message says what all of its messages lack.
-        """
+        """Return the samples."""
         if not len(self):
             for _, sentence in self._other.values():
                 raise DataError(sentence)

@@ -134,11 +134,7 @@ class Segment:
         return next(file for file in self.folder.iterdir() if file.suffix in SUFFIXES)
 
     def announce(self, channel: Channel) -> Connection:
-        """
-        Return the connection of a channel, made when it is new.
-
-        Raises DataError: nobody knows its type.
-        """
+        """Return the connection of a channel, made when it is new."""
         known = self._connections.get(channel[:2])
         if known is None:
             known = self._connections[channel[:2]] = self._connect(channel)
@@ -247,11 +243,7 @@ def clear_write_errors(path: Path, remaining: Callable[[], str] = str) -> Iterat
 
 
 def check_storage(storage: str) -> str:
-    """
-    Return the name of a storage.
-
-    Raises DataError: there is no such storage.
-    """
+    """Return the name of a storage."""
     if storage not in STORAGES:
         raise DataError(f'storage must be one of {", ".join(STORAGES)}, got {storage!r}')
     return storage

@@ -63,11 +63,7 @@ def look(path: Path) -> Bag:
 
 
 def refuse_unfinished(path: Path) -> None:
-    """
-    Refuse what is not there, and say so if it is there under the name of a growing bag.
-
-    Raises DataError: there is no bag, or it is not finished.
-    """
+    """Refuse what is not there, and say so if it is there under the name of a growing bag."""
     growing = path if is_growing(path) else unfinished(path)
     named = growing.with_name(growing.name.removesuffix(UNFINISHED))
     if growing.is_dir() and not (path.exists() and path != growing):

@@ -53,11 +53,7 @@ class BagWriter:
         self._segment: Segment | None = None
 
     def open(self) -> BagWriter:
-        """
-        Start the bag.
-
-        Raises DataError: something of that name exists, or the place cannot be written.
-        """
+        """Start the bag."""
         self._refuse_existing()
         with self._clear_errors():
             self._scratch = Scratch(self.path.parent, f'.{self.path.name}-')
@@ -75,21 +71,13 @@ class BagWriter:
         self.write_cdr(topic, kind, bytes(TYPES.serialize_cdr(message, kind)), when)
 
     def write_cdr(self, topic: str, kind: str, data: bytes, log_ns: int) -> None:
-        """
-        Write a serialised message, as a raw subscription receives it.
-
-        Raises DataError: the bag is not open, or the disk refuses.
-        """
+        """Write a serialised message, as a raw subscription receives it."""
         segment = self._opened()
         with self._clear_errors():
             segment.write(Channel(topic, kind), data, log_ns)
 
     def write_all(self, entries: Iterable[tuple[int, str, str, bytes]]) -> None:
-        """
-        Write many messages: time of recording [ns], topic, type and serialised message of each.
-
-        Raises DataError: the bag is not open, or the disk refuses.
-        """
+        """Write many messages: time of recording [ns], topic, type and serialised message of each."""
         segment = self._opened()
         channels: dict[tuple[str, str], Channel] = {}
         with self._clear_errors():
@@ -106,11 +94,7 @@ class BagWriter:
             segment.announce(Channel(topic, kind))
 
     def close(self) -> None:
-        """
-        Finish the bag and put it in its place.
-
-        Raises DataError: something of that name has appeared meanwhile, or the disk refuses.
-        """
+        """Finish the bag and put it in its place."""
         if self._segment is None or self._scratch is None:
             return
         try:

@@ -13,11 +13,7 @@ from .yaml_file import read_yaml
 
 
 def read_artefact(path: Path | str) -> Artefact:
-    """
-    Return the artefact that a YAML file describes; see `Artefact.from_mapping`.
-
-    Raises ModelError: the file cannot be read or understood; the message names the file.
-    """
+    """Return the artefact that a YAML file describes; see `Artefact.from_mapping`."""
     entry = read_yaml(path, 'artefact file')
     try:
         return Artefact.from_mapping(entry)

@@ -33,11 +33,7 @@ SIZE_LIMIT = 64_000_000
 
 
 def read_diagnosis(path: Path | str) -> dict[str, Any]:
-    """
-    Return the content of a diagnosis file.
-
-    Raises ModelError: the file cannot be read, is no JSON, or is no diagnosis.
-    """
+    """Return the content of a diagnosis file."""
     try:
         with Path(path).open('rb') as file:
             raw = file.read(SIZE_LIMIT + 1)
@@ -63,12 +59,7 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
 
 
 def read_model(robot: Robot, path: Path | str) -> Model:
-    """
-    Return the model of a diagnosis file, on the robot it was made for.
-
-    Raises ModelError: the file is no diagnosis, holds no model, or its effects do not fit the
-    robot.
-    """
+    """Return the model of a diagnosis file, on the robot it was made for."""
     content = read_diagnosis(path)
     model = content.get('model')
     if not isinstance(model, dict):
@@ -222,8 +213,6 @@ def _gap(twin: Twin, recording: Recording) -> float:
 def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
     """
     Return the twin of a diagnosis file: fitted frames, effects given and effects found.
-
-    Raises ModelError: the file holds no usable model, or has no such set-up.
 
     robot: the nominal robot that was diagnosed.
     path: diagnosis.json.

@@ -28,11 +28,7 @@ class InputFile(NamedTuple):
 
 
 def hashed(use: str, path: Path | str) -> InputFile:
-    """
-    Return an input with its hash; of a directory, over names and contents of its files in order.
-
-    Raises DataError: it cannot be read.
-    """
+    """Return an input with its hash; of a directory, over names and contents of its files in order."""
     place = Path(path)
     digest = hashlib.sha256()
     try:

@@ -48,8 +48,6 @@ def instrument(given: str) -> Instrument:
     """
     Return an instrument by name, or by what its certificate says.
 
-    Raises DataError: it is neither.
-
     given: a name of `INSTRUMENTS`, or the largest permissible error such as ``0.015+0.006/m``
     [mm]; ``@3`` behind either says that the points are 3 m away.
     """
@@ -73,8 +71,6 @@ def instrument(given: str) -> Instrument:
 def measured_by(recording: Recording, what: Instrument, *, own_frame: bool) -> Recording:
     """
     Return a recording whose measurements are as sure as an instrument's.
-
-    Raises DataError: nothing says how far away the points were.
 
     own_frame: whether the measuring frame is the instrument's own.
     """

@@ -51,8 +51,6 @@ def read_joint_motion(path: Path | str, robot: Robot) -> tuple[Array, Array, boo
     Return times (K,) [s], positions (K, n) as the robot orders them, and whether of stations.
 
     None where the file holds a seam.
-
-    Raises DataError: it is not one of this robot, or not a motion.
     """
     if Path(path).suffix.lower() not in ('.yaml', '.yml'):
         return None

@@ -24,11 +24,7 @@ from .diagnosis_model import read_diagnosis
 
 
 def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
-    """
-    Return the posterior of a diagnosis file; None where it was written without one.
-
-    Raises ModelError: the file is no diagnosis, or its posterior cannot be used with the robot.
-    """
+    """Return the posterior of a diagnosis file; None where it was written without one."""
     entry = read_diagnosis(path).get('posterior')
     if entry is None:
         return None

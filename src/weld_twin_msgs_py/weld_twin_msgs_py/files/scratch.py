@@ -32,8 +32,6 @@ class Scratch:
     parent: made if it is not there.
     prefix: of the name, which is drawn. What killed processes left of this prefix is swept first.
     rescue: called with every directory before it is swept.
-
-    Raises OSError: the place cannot be written.
     """
 
     def __init__(

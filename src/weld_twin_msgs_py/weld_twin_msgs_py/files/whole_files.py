@@ -30,11 +30,7 @@ def write_text(path: Path | str, text: str, *, overwrite: bool = False) -> None:
 
 
 def write_bytes(path: Path | str, content: bytes, *, overwrite: bool = False) -> None:
-    """
-    Write a file beside its place, then move it there; a link is followed.
-
-    Raises DataError: the file exists and ``overwrite`` is not set, or the place cannot be written.
-    """
+    """Write a file beside its place, then move it there; a link is followed."""
     target = followed(path)
     if target.exists() and not overwrite:
         raise DataError(f"'{path}' exists already and is not overwritten")
@@ -99,11 +95,7 @@ def write_json(path: Path | str, value: Any, *, overwrite: bool = False) -> None
 
 
 def read_json(path: Path | str) -> dict[str, Any]:
-    """
-    Return the mapping that a file holds.
-
-    Raises DataError: it cannot be read, or holds something else.
-    """
+    """Return the mapping that a file holds."""
     try:
         content = json.loads(Path(path).read_text(encoding='utf-8'))
     except OSError as error:

@@ -79,12 +79,7 @@ _Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
 
 
 def read_text(path: Path | str, kind: str) -> str:
-    """
-    Return the text of a small file.
-
-    Raises ModelError: there is no such file, it is too large, or it is no text; ``kind`` names
-    what was wanted.
-    """
+    """Return the text of a small file."""
     try:
         data = _small(Path(path), kind)
         return data.decode('utf-8-sig')
@@ -103,20 +98,12 @@ def _small(path: Path, kind: str) -> bytes:
 
 
 def read_yaml(path: Path | str, kind: str) -> Any:
-    """
-    Return the data of a YAML file.
-
-    Raises ModelError: the file cannot be read or is malformed; the message names file and line.
-    """
+    """Return the data of a YAML file."""
     return parse_yaml(read_text(path, kind), f"{kind} '{path}'")
 
 
 def parse_yaml(text: str, what: str) -> Any:
-    """
-    Return the data of YAML text; ``what`` names it in messages.
-
-    Raises ModelError: it is malformed; the message names the line.
-    """
+    """Return the data of YAML text; ``what`` names it in messages."""
     try:
         return yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:

@@ -137,11 +137,7 @@ class JointStateDecoder:
         self._known: dict[bytes, _Kept] = {}
 
     def __call__(self, data: bytes) -> JointState:
-        """
-        Return the joint state.
-
-        Raises DataError: the bytes are none.
-        """
+        """Return the joint state."""
         for head, (frame, name, body, at, end, moving) in self._known.items():
             if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
@@ -252,11 +248,7 @@ READERS: dict[str, Callable[[_Cursor], Any]] = {
 
 
 def decoded(kind: str, read: Callable[[_Cursor], Any], data: bytes) -> Any:
-    """
-    Return what a reader makes of a serialised message.
-
-    Raises DataError: the bytes are no message of the type.
-    """
+    """Return what a reader makes of a serialised message."""
     try:
         return read(_Cursor(data))
     except (error, UnicodeDecodeError, DataError) as reason:

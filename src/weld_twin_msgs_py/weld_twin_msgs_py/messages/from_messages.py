@@ -76,9 +76,6 @@ def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
     Return joint positions, shape (n,) [rad or m], matched by name.
 
     Order does not matter and further joints are left out.
-
-    Raises DataError: a joint is missing (the message names it and those present), there are fewer
-    positions than names, or a position is not finite.
     """
     index = _indices(tuple(message.name), tuple(joint_names))
     values = message.position
@@ -96,8 +93,6 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
 
     joint_state_broadcaster writes NaN for a joint without a velocity interface, so NaN means
     unknown here; an infinite velocity is refused.
-
-    Raises DataError: a velocity is infinite.
     """
     values = message.velocity
     if len(values) != len(message.name):
@@ -110,11 +105,7 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
 
 
 def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
-    """
-    Return the measured efforts of the joints, shape (n,) [N m, or N of a slide].
-
-    Raises DataError: there are none, there are fewer efforts than names, or one is not finite.
-    """
+    """Return the measured efforts of the joints, shape (n,) [N m, or N of a slide]."""
     values = getattr(message, 'effort', ())
     if not len(values):
         raise DataError(
@@ -147,11 +138,7 @@ def _xyz(vector: Any, name: str) -> Array:
 
 
 def pose(message: Any) -> tuple[Array, Array]:
-    """
-    Return position (3,) [m] and rotation (3, 3) of a PoseStamped or PoseWithCovarianceStamped.
-
-    Raises DataError: a number is not finite, or the quaternion is not of length 1.
-    """
+    """Return position (3,) [m] and rotation (3, 3) of a PoseStamped or PoseWithCovarianceStamped."""
     inner = message.pose
     inner = getattr(inner, 'pose', inner)
     q = inner.orientation
@@ -160,11 +147,7 @@ def pose(message: Any) -> tuple[Array, Array]:
 
 
 def point(message: Any) -> Array:
-    """
-    Return the point of a PointStamped, shape (3,) [m].
-
-    Raises DataError: a coordinate is not finite.
-    """
+    """Return the point of a PointStamped, shape (3,) [m]."""
     return _xyz(message.point, 'the point')
 
 
@@ -174,31 +157,18 @@ def position(message: Any) -> Array:
 
 
 def vector3(message: Any) -> Array:
-    """
-    Return the vector of a Vector3Stamped, shape (3,).
-
-    Raises DataError: a component is not finite.
-    """
+    """Return the vector of a Vector3Stamped, shape (3,)."""
     return _xyz(message.vector, 'the vector')
 
 
 def wrench(message: Any) -> Array:
-    """
-    Return force and torque of a WrenchStamped, shape (6,) [N, N m].
-
-    Raises DataError: a component is not finite.
-    """
+    """Return force and torque of a WrenchStamped, shape (6,) [N, N m]."""
     inner = message.wrench
     return np.concatenate([_xyz(inner.force, 'the force'), _xyz(inner.torque, 'the torque')])
 
 
 def temperature(message: Any) -> float:
-    """
-    Return the temperature of a Temperature message [degC].
-
-    Raises DataError: it is not finite, or below absolute zero, or so high that it must be in
-    kelvin.
-    """
+    """Return the temperature of a Temperature message [degC]."""
     return checked_temperature(float(message.temperature))
 
 
@@ -207,8 +177,6 @@ def position_sigma(message: Any) -> float | None:
     Return one standard deviation of a PoseWithCovarianceStamped's position [m].
 
     None where the covariance is left at zero. Axes are joined by their root mean square.
-
-    Raises DataError: a variance is negative or not finite.
     """
     diagonal = readonly(np.asarray(message.pose.covariance)[list(VARIANCES)], (3,), 'covariance')
     if (diagonal < 0.0).any():
@@ -221,9 +189,6 @@ def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
     Return the motion of a JointTrajectory, matched by name, t from its first point [s].
 
     Velocities are kept where every point has them.
-
-    Raises DataError: a joint is missing, there are fewer than two points, a point has not one
-    position per name, a number is not finite, or the times do not increase.
     """
     index = list(_indices(tuple(message.joint_names), tuple(joint_names)))
     count, points = len(message.joint_names), message.points
@@ -242,11 +207,7 @@ def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
 
 
 def path_points(message: Any) -> Array:
-    """
-    Return the positions of a Path, shape (N, 3) [m].
-
-    Raises DataError: there are fewer than two poses, or a coordinate is not finite.
-    """
+    """Return the positions of a Path, shape (N, 3) [m]."""
     if len(message.poses) < 2:
         raise DataError(f'the path has {len(message.poses)} poses; a seam needs two')
     return np.stack([_xyz(item.pose.position, 'a pose of the path') for item in message.poses])

@@ -32,9 +32,6 @@ def read_goal(trajectory: Any, joint_names: Sequence[str]) -> GoalPoints:
     Return the points of a JointTrajectory, in the order of the robot's joints.
 
     Further joints, such as those of a track, are left as they are. One prefix is taken off.
-
-    Raises DataError: a joint is missing or named twice, or points do not hold the numbers they
-    should.
     """
     names = list(trajectory.joint_names)
     columns = _columns(names, joint_names)

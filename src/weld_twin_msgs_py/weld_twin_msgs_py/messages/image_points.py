@@ -37,11 +37,7 @@ def label(tag: int, corner: int) -> str:
 
 
 def corners(message: Any) -> Marks:
-    """
-    Return the corners of all tags in a message.
-
-    Raises DataError: a tag has not four corners, or one of them is no finite number.
-    """
+    """Return the corners of all tags in a message."""
     out: Marks = []
     for result in message.detections:
         if len(result.corners) != len(OURS):
@@ -62,11 +58,7 @@ DOUBLE = 8
 
 
 def points(message: Any) -> Array:
-    """
-    Return the rows of a PointCloud2, shape (N, 4): target, point, u and v [px].
-
-    Raises DataError: a field is missing, or the data are shorter than they should be.
-    """
+    """Return the rows of a PointCloud2, shape (N, 4): target, point, u and v [px]."""
     fields = {field.name: field for field in message.fields}
     for name in FIELDS:
         if name not in fields or fields[name].datatype not in KINDS:

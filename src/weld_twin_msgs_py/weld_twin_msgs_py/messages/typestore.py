@@ -18,11 +18,7 @@ PROVENANCE_PREFIX = 'weld_twin/'
 
 @lru_cache(maxsize=32)
 def types_with(kind: str, definition: str, idl: bool = False) -> Typestore:
-    """
-    Return a store of types that knows one more, as a bag defines it.
-
-    Raises DataError: there is no definition.
-    """
+    """Return a store of types that knows one more, as a bag defines it."""
     if not definition:
         raise DataError(
             f'the bag does not say what a {kind} is; record it as mcap, which holds the definition'

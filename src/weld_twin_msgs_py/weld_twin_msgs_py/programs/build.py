@@ -111,8 +111,6 @@ class Program:
         """
         Add a point and return its index.
 
-        Raises DataError: its numbers make no pose.
-
         file: which of the sources they stand in.
         external: positions of external axes at a pose, shape (m,).
         """

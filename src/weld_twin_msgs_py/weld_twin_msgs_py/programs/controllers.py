@@ -63,8 +63,6 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
     """
     Return the external axes of a robot in the order of its joints.
 
-    Raises DataError: it is missing and has to be given, the language has none, or it is wrong.
-
     given: which is which, as ``E1=rail,E2=-tilt``; empty where it is not given.
     """
     names = robot.joint_names[: carrying(robot)]
@@ -179,11 +177,7 @@ class Controller:
     """Names of the tools of a program that nobody gives numbers for."""
 
     def tool(self, frame: Frame) -> Array:
-        """
-        Return ``T_flange_tool`` on the model.
-
-        Raises DataError: the program gives no numbers for it, nor does anybody else.
-        """
+        """Return ``T_flange_tool`` on the model."""
         given = self.tools.get(frame.name.lower())
         if given is not None or frame.value is not None:
             value = frame.value if given is None else given
@@ -217,12 +211,7 @@ class Controller:
         self.bare.update(f.name for f in open_ if f.name.lower() not in self.tools)
 
     def goes_along(self, frame: Frame) -> bool:
-        """
-        Tell whether a base goes along with a positioner.
-
-        Raises DataError: nothing tells it, or it stands still and nobody knows where it counts
-        from.
-        """
+        """Tell whether a base goes along with a positioner."""
         moving = frame.moving
         if moving and not self.positioner:
             raise DataError(
@@ -244,11 +233,7 @@ class Controller:
         return bool(moving)
 
     def base(self, frame: Frame) -> Array:
-        """
-        Return ``T_base_frame`` on the model; of one that goes along, on the positioner's flange.
-
-        Raises DataError: the program gives no numbers for it, nor does anybody else.
-        """
+        """Return ``T_base_frame`` on the model; of one that goes along, on the positioner's flange."""
         given = self.bases.get(frame.name.lower())
         origin = np.eye(4) if self.goes_along(frame) else self.origin
         if given is not None:

@@ -90,8 +90,6 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
     """
     Return the name of a program's language.
 
-    Raises DataError: there is no such language, or the file is of none that is known.
-
     path: where it was read.
     controller: as the user named it; empty to let the file tell.
     """
@@ -116,8 +114,6 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
 def read_program(path: Path | str, context: Context, controller: str = '') -> Program:
     """
     Return a program with the files that belong to it.
-
-    Raises DataError: it cannot be read, tells no language, or a move in it is broken.
 
     controller: its language; empty to let the file tell.
     """

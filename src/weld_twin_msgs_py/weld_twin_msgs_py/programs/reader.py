@@ -50,11 +50,7 @@ class Reader(ABC):
 
     @abstractmethod
     def read(self) -> Program:
-        """
-        Return what is understood of the program.
-
-        Raises DataError: a point or a move is broken, or said twice; names file and line.
-        """
+        """Return what is understood of the program."""
 
     def in_order(
         self,

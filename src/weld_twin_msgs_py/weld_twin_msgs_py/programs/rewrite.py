@@ -72,8 +72,6 @@ def check_written(before: Program, after: Program, points: Sequence[Array]) -> N
     """
     Refuse a program that does not say what it was to say when it is read again.
 
-    Raises DataError: a move or a point differs.
-
     before, after: as it was, and the new text read again.
     points: what the new text is to say.
     """

@@ -207,11 +207,7 @@ class Number(NamedTuple):
 
 
 def read_source(path: Path | str) -> Source:
-    """
-    Return the text of a file.
-
-    Raises DataError: it cannot be read, is empty, too large, or no text.
-    """
+    """Return the text of a file."""
     try:
         with Path(path).open('rb') as file:
             raw = file.read(SIZE_LIMIT + 1)
@@ -236,8 +232,6 @@ def read_source(path: Path | str) -> Source:
 def number_at(source: Source, start: int, end: int, what: str, file: int = 0) -> Number:
     """
     Return the number that a piece of text is.
-
-    Raises DataError: the piece is not one number, or not a finite one.
 
     start, end: the piece.
     what: what the number is, for the message.
@@ -270,11 +264,7 @@ def split_outside(text: str, start: int, end: int, comma: str = ',') -> list[tup
 
 
 def closing(source: Source, text: str, opening: int) -> int:
-    """
-    Return the place of the bracket that closes the one at a place.
-
-    Raises DataError: none does.
-    """
+    """Return the place of the bracket that closes the one at a place."""
     depth = 0
     for k in range(opening, len(text)):
         if text[k] in '([{':

@@ -105,11 +105,7 @@ class UrscriptReader(Reader):
         return self.program
 
     def _routines(self) -> list[tuple[str, Span]]:
-        """
-        Return names and statements of the routines; of one that holds others, all of it.
-
-        Raises DataError: one of them, or a block, has no end.
-        """
+        """Return names and statements of the routines; of one that holds others, all of it."""
         out, begun = list[tuple[str, Span]](), list[re.Match[str] | None]()
         for result in _WORD.finditer(self.text):
             if result[6]:

@@ -184,11 +184,7 @@ UR_ACCELERATION = (0.5, 0.3)
 
 
 def written(program: Exported, language: str) -> str:
-    """
-    Return the text of a program.
-
-    Raises DataError: the language cannot say it, as INFORM without the pulses of every axis.
-    """
+    """Return the text of a program."""
     return WRITERS[language](program)
 
 

@@ -84,8 +84,6 @@ def flange_link_of(
     """
     Return the link of the controller's flange, and where it is in the tip link.
 
-    Raises ModelError: the link asked for is not there, or not fixed to the last link that moves.
-
     chain: from base to tip.
     wanted: the link that was asked for.
     """

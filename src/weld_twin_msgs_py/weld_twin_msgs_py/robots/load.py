@@ -59,8 +59,6 @@ def _own_robot(spec: str) -> Path | None:
     """
     Return the file of a robot of one's own, None where the name is none of theirs.
 
-    Raises ModelError: several robots have the name; none of them is taken for the other.
-
     spec: a name without a suffix, in capital or small letters.
     """
     result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]

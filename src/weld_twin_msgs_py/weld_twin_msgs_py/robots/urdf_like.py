@@ -65,9 +65,6 @@ def write_urdf_like(
     is the controller's flange, or carries it, a link ``controller_flange`` keeps the flange where
     it is, and a fixed joint more holds the tool.
 
-    Raises DataError: the file exists and ``overwrite`` is not set, or the place cannot be written.
-    Raises ModelError: the given file cannot be read.
-
     robot: the corrected one, with the joints of the given file; where its base stands in the world
     is not written.
     notes: comments at the top.

@@ -311,11 +311,7 @@ def _gravity(tree: Tree, base: str) -> Array:
 
 
 def refuse_wrong_units(robot: Robot) -> None:
-    """
-    Refuse a robot whose numbers look like degrees or millimetres.
-
-    Raises ModelError: names the joint, the value and the unit wanted.
-    """
+    """Refuse a robot whose numbers look like degrees or millimetres."""
     names, turning = robot.joint_names, ~robot.prismatic
     for key in ('alpha', 'theta', 'beta'):
         _check(names, getattr(robot, key), _TURN, key, 'degrees in a radian field')

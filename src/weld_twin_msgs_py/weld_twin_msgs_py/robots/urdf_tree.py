@@ -97,20 +97,12 @@ class Tree(NamedTuple):
 
 
 def read_tree(path: Path | str) -> Tree:
-    """
-    Read a URDF.
-
-    Raises ModelError: the file cannot be read, is not well-formed, carries a DTD, or is no URDF.
-    """
+    """Read a URDF."""
     return parse_tree(read_text(path, 'URDF'), path)
 
 
 def parse_tree(text: str, path: Path | str) -> Tree:
-    """
-    Read the text of a URDF; ``path`` says in errors where it came from.
-
-    Raises ModelError: the text is not well-formed, carries a DTD, or is no URDF.
-    """
+    """Read the text of a URDF; ``path`` says in errors where it came from."""
     try:
         root = fromstring(text, forbid_dtd=True)
     except ParseError as error:

@@ -108,11 +108,7 @@ def read_target(name: str, path: Path | str, mount: str | None = None) -> Target
 
 
 def read_board(path: Path | str) -> Mapping[str, Any]:
-    """
-    Return the numbers of a board: ``board``, ``squares``, ``square`` and what else the file has.
-
-    Raises DataError, ModelError: the file cannot be read, or a number is missing.
-    """
+    """Return the numbers of a board: ``board``, ``squares``, ``square`` and what else the file has."""
     entry = read_yaml(path, 'board file')
     try:
         board_points(entry)

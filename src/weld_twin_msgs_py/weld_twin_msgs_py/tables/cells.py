@@ -35,11 +35,7 @@ class Cells:
     """What was found out, one sentence each."""
 
     def column(self, name: str) -> list[str]:
-        """
-        Return a column as text.
-
-        Raises DataError: there is no such column; the message lists those there are.
-        """
+        """Return a column as text."""
         if name not in self.header:
             raise DataError(
                 f"table '{self.path}' has no column {name!r}; its columns are "
@@ -49,11 +45,7 @@ class Cells:
         return [row[k] for row in self.rows]
 
     def numbers(self, name: str) -> Array:
-        """
-        Return a column as numbers, shape (rows,); NaN where a cell is empty.
-
-        Raises DataError: a cell is no number; the message names line and column.
-        """
+        """Return a column as numbers, shape (rows,); NaN where a cell is empty."""
         column = self.column(name)
         if self.decimal != ',':
             with suppress(ValueError):  # as all columns are that are plain numbers
@@ -108,9 +100,6 @@ def read_cells(
 ) -> Cells:
     """
     Read a delimited text file with a header line, or a log or export in a form that is known.
-
-    Raises DataError: no such file, no table, ragged rows, or a delimiter or decimal sign that is
-    not clear.
 
     delimiter, decimal: left out, they are found.
     marker: what is meant, where an export holds several things that were tracked.

@@ -129,8 +129,6 @@ def headed(known: Format, text: str, marker: str | None) -> Read:
     """
     Return the columns of a known format that mean something here.
 
-    Raises DataError: it has several, and none was named.
-
     marker: marker or body that is meant, where the file has several.
     """
     lines = text.splitlines()
@@ -223,11 +221,7 @@ def _meant(
 
 
 def one_of(names: list[str], marker: str | None) -> str:
-    """
-    Return the thing that is meant.
-
-    Raises DataError: several were tracked and none was named, or there is none of the name.
-    """
+    """Return the thing that is meant."""
     if marker in names:
         return str(marker)
     if marker is None and len(names) == 1:

@@ -78,12 +78,7 @@ class Columns:
 
 
 def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> Columns:
-    """
-    Return the columns by use.
-
-    Raises DataError: a use that is needed has no column, or more than one; the message names the
-    option that decides.
-    """
+    """Return the columns by use."""
     parts = [_taken_apart(name) for name in header]
     out = Columns(units={part.name: part.unit for part in parts})
     out.joints = options.joint_columns or _joints(parts, robot)
@@ -109,12 +104,7 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
 
 
 def joint_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> tuple[str, ...]:
-    """
-    Return the joint columns alone, in the robot's order.
-
-    Raises DataError: there are none, or more than one set; the message names the option that
-    decides.
-    """
+    """Return the joint columns alone, in the robot's order."""
     return options.joint_columns or _joints([_taken_apart(name) for name in header], robot)
 
 

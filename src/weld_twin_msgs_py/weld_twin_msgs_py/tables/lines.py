@@ -40,8 +40,6 @@ def number(text: str, decimal: str) -> float:
     """
     Return a cell as a number.
 
-    Raises ValueError: it is none.
-
     decimal: '.' or ','.
     """
     plain = _GAP.sub('', text).replace('\N{MINUS SIGN}', '-')
@@ -57,9 +55,6 @@ def number(text: str, decimal: str) -> float:
 def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -> str:
     """
     Return the decimal sign of the numbers in some rows.
-
-    Raises DataError: some numbers have a comma and some a point, and no group of thousands tells
-    why.
 
     path: for the message.
     delimiter: between the cells; a comma there is no decimal sign.
@@ -90,8 +85,6 @@ def without_units(
 ) -> tuple[list[str], list[list[str]]]:
     """
     Return a table with units that stand behind every number of a column taken into its header.
-
-    Raises DataError: the header gives another unit than the cells.
 
     path: for the message.
     unit_of_name: units that the header gives already.
@@ -137,9 +130,6 @@ class Lines(NamedTuple):
 def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -> Lines:
     """
     Return the header and the rows of a text, and say how they were found.
-
-    Raises DataError: there is no table, the delimiter is not clear, rows are ragged, or a
-    quotation mark is not closed.
 
     path: for messages.
     delimiter: left out, it is found.

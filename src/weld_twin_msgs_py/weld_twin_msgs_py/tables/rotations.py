@@ -57,11 +57,7 @@ def _relative(rotation: Array) -> Array:
 
 
 def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
-    """
-    Return the convention of the angles and the sentence that says how it was found.
-
-    Raises DataError: none agrees with the arm, or several do.
-    """
+    """Return the convention of the angles and the sentence that says how it was found."""
     result = {
         name: disagreement(rotations(angles, name), robot, q)
         for name in (*EULER_ORDERS, ROTATION_VECTOR)

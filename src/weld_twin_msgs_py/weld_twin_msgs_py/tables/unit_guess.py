@@ -38,8 +38,6 @@ def factor(known: Mapping[str, float], unit: str, column: str, what: str) -> flo
     """
     Return what a column is multiplied with.
 
-    Raises DataError: the unit is that of something else.
-
     known: units that fit, and what they are in SI.
     unit: that the header or the user gives.
     column, what: for people: the column, and what it is taken for.

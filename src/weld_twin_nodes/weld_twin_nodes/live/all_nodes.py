@@ -46,8 +46,6 @@ def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
     Refuse parameters that no node of this package has: a mistyped one would be passed over.
 
     A parameter file may hold those of the other nodes too.
-
-    Raises DataError: there is one; the message names the one that was meant, if it is like one.
     """
     known = {*own, *ROS_OWN}
     odd = [name for name in given if name not in known and not name.startswith(PREFIX)]

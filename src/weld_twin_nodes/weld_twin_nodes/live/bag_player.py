@@ -53,11 +53,7 @@ class Playing(NamedTuple):
 
 
 def play(bag: Path | str, how: Playing, tell: Callable[[str], None]) -> int:
-    """
-    Play a bag; return how many messages were published.
-
-    Raises DataError: the bag cannot be read or has no such topic, or the rate makes no sense.
-    """
+    """Play a bag; return how many messages were published."""
     if not 0.0 < how.rate < float('inf'):
         raise DataError(f'the rate must be positive, got {how.rate:g}')
     with BagReader(bag) as reader, _node() as node:

@@ -162,9 +162,6 @@ class CellNode(TellingNode):
         required: the node can do nothing without this input; health calls its absence stale.
         at_once: do not wait for the subscribers of the outputs.
         hold_last: see `watch`.
-
-        Raises ModelError: by a remap the node publishes the topic itself, or has it as another
-        input.
         """
         name = self.resolve_topic_name(topic.relative)
         if any(output.topic == name for output in self._outputs):
@@ -363,11 +360,7 @@ class CellNode(TellingNode):
         self.keep('waiting', said, logged=False)
 
     def serve_until(self, condition: Callable[[], bool], what: str) -> None:
-        """
-        Serve until the node has what it can do nothing without; say what it waits for.
-
-        Raises ModelError: the node is stopped before.
-        """
+        """Serve until the node has what it can do nothing without; say what it waits for."""
         self.wait_for(what)
         runner = SingleThreadedExecutor(context=self.context)
         runner.add_node(self)

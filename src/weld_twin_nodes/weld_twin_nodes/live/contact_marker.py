@@ -41,11 +41,7 @@ class Part:
         self.heard = 0.0
 
     def take(self, stamp: int, q: np.ndarray) -> None:
-        """
-        Take a sample, at a stamp [ns].
-
-        Raises DataError: the stamp is not after the last one.
-        """
+        """Take a sample, at a stamp [ns]."""
         if self._order.restarted_at(stamp):
             self._lately.clear()
         self._lately.append((stamp, q))

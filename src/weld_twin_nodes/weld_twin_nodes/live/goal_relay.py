@@ -218,11 +218,7 @@ class GoalRelay:
 
 
 def _action_of(node: CellNode, controller: str) -> str:
-    """
-    Return the name of a controller's action.
-
-    Raises ModelError: it is no name, or this node's own.
-    """
+    """Return the name of a controller's action."""
     own = controller.rstrip('/')
     below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
     try:

@@ -152,8 +152,6 @@ def policy(
     namespace: of all the nodes.
     remaps: names as the nodes have them, with or without the namespace, to the names they get.
     nodes: nodes it is for; none for all.
-
-    Raises DataError: a node or the name that is remapped is unknown.
     """
     chosen = tuple(nodes) or tuple(SPOKEN)
     unknown = [name for name in chosen if name not in SPOKEN]

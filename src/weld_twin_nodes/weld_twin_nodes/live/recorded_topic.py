@@ -40,11 +40,7 @@ BUILT_IN = (
 
 
 def definition(kind: str) -> str:
-    """
-    Return the definition of a message type and of all it is made of, as bags hold it.
-
-    Raises DataError: its package, or one it needs, is not installed with its .msg files.
-    """
+    """Return the definition of a message type and of all it is made of, as bags hold it."""
     parts: dict[str, str] = {}
     _gather(kind, parts, _installed)
     first, *others = parts.items()

@@ -216,11 +216,7 @@ class RecordingRun:
             self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
 
     def close(self) -> None:
-        """
-        Complete the bag and stop listening.
-
-        Raises TwinError: it could not all be written.
-        """
+        """Complete the bag and stop listening."""
         for timer in self._timers:
             self._node.destroy_timer(timer)
         if not self._concluded:
@@ -267,11 +263,7 @@ class Recorder(ManagedNode):
         self.start()
 
     def own_topics(self) -> Sequence[str]:
-        """
-        Return what it is asked to record.
-
-        Raises DataError: a name is none that a topic can have.
-        """
+        """Return what it is asked to record."""
         topics: list[str] = self.setting('topics')
         for name in topics:
             try:

@@ -45,12 +45,7 @@ MOVED = 1e-4
 
 
 def base_on_tf(node: CellNode) -> Array:
-    """
-    Return T_measuring_base, shape (4, 4), once `/tf` tells it.
-
-    Raises ModelError: the two frames have no names, `/tf` cannot be read here, or the node is
-    stopped before they are known.
-    """
+    """Return T_measuring_base, shape (4, 4), once `/tf` tells it."""
     measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
     if not measuring or not base:
         raise ModelError('base_from_tf needs the names measuring_frame and base_frame')
@@ -127,12 +122,7 @@ def base_frame(node: CellNode) -> str:
 
 
 def place_robot(node: CellNode, robot: Robot) -> Robot:
-    """
-    Return the robot with its base where the node's parameters put it.
-
-    Raises ModelError: ``T_measuring_base`` is no pose, or the node is stopped before `/tf` tells
-    one.
-    """
+    """Return the robot with its base where the node's parameters put it."""
     values = node.setting('T_measuring_base')
     if values != NO_NUMBERS:
         return robot.with_origin(frame_from(values))
@@ -171,12 +161,7 @@ def say_doubts(node: CellNode, robot: Robot, effects: Sequence[Effect]) -> None:
 
 
 def frame_from(values: Sequence[float] | str) -> Array:
-    """
-    Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion.
-
-    Raises ModelError: there are neither six nor seven finite numbers, or the quaternion is not of
-    length 1.
-    """
+    """Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion."""
     try:
         numbers = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -230,12 +215,7 @@ MEASURED_SETTINGS = (
 
 
 def joint_names(node: CellNode, robot: Robot) -> tuple[str, ...] | None:
-    """
-    Return what the joint states call the joints of a robot; None where nothing is said.
-
-    Raises ModelError: the map is no mapping of names, names a joint the robot has not, or gives a
-    name twice.
-    """
+    """Return what the joint states call the joints of a robot; None where nothing is said."""
     prefix, text = node.setting('joint_prefix'), node.setting('joint_map')
     if not prefix and not text:
         return None
@@ -265,11 +245,7 @@ CHANGED = 'robot changed'
 
 
 def robot_of(node: CellNode) -> Robot:
-    """
-    Return the robot a node's parameters name.
-
-    Raises ModelError: there is no such robot, or its file or description cannot be used.
-    """
+    """Return the robot a node's parameters name."""
     name = node.setting('robot')
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
     if names_topic(name):

@@ -158,11 +158,7 @@ QUOTED = (
 
 
 def _open(args: list[str] | None) -> None:
-    """
-    Open ROS; raise a sentence where it cannot read the arguments.
-
-    Raises ModelError: an argument after ``--ros-args`` is no parameter or no remap.
-    """
+    """Open ROS; raise a sentence where it cannot read the arguments."""
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own error of it has no public name
@@ -180,11 +176,7 @@ def _open(args: list[str] | None) -> None:
 
 
 def _made(make: Callable[[], CellNode]) -> CellNode:
-    """
-    Return the node; raise a sentence where the middleware cannot keep it as safe as it must be.
-
-    Raises ModelError: security is enforced, and the middleware has none, or not the node's keys.
-    """
+    """Return the node; raise a sentence where the middleware cannot keep it as safe as it must be."""
     try:
         return make()
     except RuntimeError as error:  # rclpy's own error of it has no public name

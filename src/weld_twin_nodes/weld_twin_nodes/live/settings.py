@@ -32,8 +32,6 @@ class QosOverrides:
 
     given: names of the parameters that the node was started with.
     topics: what the node may have, under the names they have for it.
-
-    Raises DataError: a parameter names no such topic, or a policy that cannot be chosen.
     """
 
     def __init__(self, node: Node, given: Iterable[str], topics: Collection[str]) -> None:
@@ -43,11 +41,7 @@ class QosOverrides:
             self._refuse_odd(name, topics)
 
     def of(self, topic: str, role: str, qos: Qos) -> Qos:
-        """
-        Return the quality of service of a publisher or subscription.
-
-        Raises DataError: a value is none of those that there are.
-        """
+        """Return the quality of service of a publisher or subscription."""
         policies = ('reliability', 'durability', 'depth')
         values = {policy: self._value(topic, role, policy) for policy in policies}
         return replace(qos, **{key: value for key, value in values.items() if value is not None})

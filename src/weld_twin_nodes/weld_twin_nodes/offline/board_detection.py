@@ -36,9 +36,6 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
     board: ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
     ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it; or ``board: tags``, their
     numbers and ``dictionary``.
-
-    Raises ModelError: OpenCV is not installed, or does not know the dictionary. Raises DataError:
-    an image cannot be read.
     """
     try:
         import cv2  # an extra of its own: few need it, and it weighs 60 MB

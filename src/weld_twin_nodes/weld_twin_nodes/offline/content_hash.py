@@ -20,8 +20,6 @@ def digest(*values: Any) -> str:
 
     Arrays, numbers, strings, None, mappings, sequences, classes, functions and dataclasses of
     these.
-
-    Raises DataError: a value is none of them.
     """
     state = hashlib.sha256()
     for value in values:

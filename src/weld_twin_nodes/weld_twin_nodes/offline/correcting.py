@@ -131,11 +131,7 @@ def corrected_program(
     start: Array | None = None,  # shape (n,), joint positions before the first move
     readings: str = '',  # why the model counts joints otherwise, see `other_readings`
 ) -> CorrectedProgram:
-    """
-    Return a program corrected so that the real tool goes where it means.
-
-    Raises DataError: there is no move to correct, or none that can be.
-    """
+    """Return a program corrected so that the real tool goes where it means."""
     name = program.sources[0].name
     if readings:
         where = [f'{p.where}: {p.name} holds' for p in program.points if p.value.ndim == 1]
@@ -353,8 +349,6 @@ def tolerance_entry(
     model: it was corrected with.
     tolerance: of the tool's distance from where the program means it [m].
     noise: standard deviation of a measured coordinate, of postures measured in addition [m].
-
-    Raises DataError: the tolerance means nothing, or the model does not say how sure it is.
     """
     if not 0.0 < tolerance < 1.0:
         raise DataError(f'--tolerance must be above zero, got {tolerance * 1e3:g} mm')
@@ -443,12 +437,7 @@ class LoadedModel:
 
 
 def loaded(robot: Robot, path: str) -> LoadedModel:
-    """
-    Return the model of a file.
-
-    Raises ModelError: there is none, it is of another robot, its data were unsound, or it counts
-    joints otherwise than they are read.
-    """
+    """Return the model of a file."""
     if not path:
         raise ModelError("the compensator needs the parameter 'model': a diagnosis.json")
     file = Path(path)

@@ -39,12 +39,7 @@ def build_twin(
     # The caller mends joint positions as the diagnosis did; see `mended_source`.
     mended: bool = False,
 ) -> Twin:
-    """
-    Return a robot with the effects of a file and those of a text.
-
-    Raises ModelError: a file or the text cannot be read, or names an effect the robot cannot have,
-    or a value that no machine comes near; or the model counts joints otherwise than they are read.
-    """
+    """Return a robot with the effects of a file and those of a text."""
     more = effects_from_list(parse_yaml(effects, 'effects'), robot)
     if not implausible:
         _possible(robot, more, 'effects')
@@ -168,11 +163,7 @@ def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
 def given_cameras(
     cameras: Iterable[str], targets: Iterable[str]
 ) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
-    """
-    Return the cameras and targets of texts such as ``left=left.yaml``.
-
-    Raises DataError, ModelError: a text is no NAME=FILE, or a file cannot be read.
-    """
+    """Return the cameras and targets of texts such as ``left=left.yaml``."""
     # Tables load much that a node without cameras has no use for.
     from weld_twin_msgs_py.tables import read_camera, read_target
 

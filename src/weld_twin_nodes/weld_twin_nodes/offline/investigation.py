@@ -247,11 +247,7 @@ def begin(robot: str, options: Sequence[str], budget: float) -> State:
 
 
 def read_state(directory: Path) -> State:
-    """
-    Return the state of an investigation.
-
-    Raises DataError: there is none, or it cannot be read.
-    """
+    """Return the state of an investigation."""
     content = read_json(directory / STATE)
     if content.get('schema') != SCHEMA:
         raise DataError(f"'{directory / STATE}' is no investigation")
@@ -264,11 +260,7 @@ def write_state(directory: Path, state: State) -> None:
 
 
 def recordings(state: State) -> tuple[list[str], list[str]]:
-    """
-    Return the recordings that it began with, and those of the experiments so far.
-
-    Raises DataError: one of them is gone, or has changed since.
-    """
+    """Return the recordings that it began with, and those of the experiments so far."""
     first: list[str] = []
     later: list[str] = []
     for k, step in enumerate(state['rounds']):

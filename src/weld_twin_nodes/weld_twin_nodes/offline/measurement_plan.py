@@ -66,12 +66,7 @@ def planned(
     least: int = LEAST,
     offered: int = MOST_ASKED,
 ) -> Planned:
-    """
-    Return the stations that a measurement needs.
-
-    Raises DataError: there is no time for the fewest stations that can be judged, or for those
-    asked for.
-    """
+    """Return the stations that a measurement needs."""
     if postures is not None:
         return _so_many(robot, postures, minutes, seconds, plan_of, (least, offered))
     if minutes is None:

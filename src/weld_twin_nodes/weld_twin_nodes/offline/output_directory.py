@@ -261,11 +261,7 @@ def _drop(folder: Path, name: str) -> None:
 
 
 def refuse(folder: Path, mark: str, names: list[str]) -> None:
-    """
-    Refuse a change that files are in the way of.
-
-    Raises DataError: there are some.
-    """
+    """Refuse a change that files are in the way of."""
     if names:
         raise DataError(sentence(folder, mark, names))
 
@@ -295,8 +291,6 @@ def new_directory(
 
     Files of the same result that were there are replaced, those not made again removed. Whatever a
     person has changed, and whatever else lies there, stays.
-
-    Raises DataError: something is in the way, or the place cannot be written.
     """
     target = followed(path)
     try:
@@ -334,7 +328,6 @@ def new_file(path: Path | str, *, force: bool = False) -> Iterator[Path]:
 
     ``path``: a file, in a folder that may be anybody's. A link is followed. ``force``: as
     `new_directory` takes it.
-    Raises DataError: what is there is not ours, or the place cannot be written.
     """
     target = followed(path)
     if target.is_dir():

@@ -111,11 +111,7 @@ def predictor(
     recording: Recording,
     setup: int | None = None,  # which recording's base frame, counted from 1; overrides the bag
 ) -> Predictor:
-    """
-    Return the twin of a model file for a bag, and how sure it is.
-
-    Raises ModelError: the file is of no use, or it is open which base frame is meant.
-    """
+    """Return the twin of a model file for a bag, and how sure it is."""
     content = diagnosis_of(path)
     if 'model' not in content:
         return Predictor(build_twin(robot, path))
@@ -145,11 +141,7 @@ def predictor(
 
 
 def on_one_clock(recording: Recording) -> Recording:
-    """
-    Return a recording whose measurements have some time in common with the joint states.
-
-    Raises DataError: they have none.
-    """
+    """Return a recording whose measurements have some time in common with the joint states."""
     if recording.measured is not None and not recording.joints.static:
         refuse_apart(recording.joints, recording.measured)
     return recording
@@ -167,8 +159,6 @@ def write_prediction(
     Write the recording with the twin's pose at every joint state, its covariance, deviations.
 
     The stretches outside what was recorded go into `BESIDE`, in the bag's directory.
-
-    Raises DataError: the path exists or cannot be written.
     """
     twin = model.twin
     poses = twin.poses(recording, recording.joints.t)
@@ -249,11 +239,7 @@ class Compensated(NamedTuple):
 
 
 def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
-    """
-    Return the commands for a model file, less corrected where the model knows less.
-
-    Raises ModelError: the file is of no use.
-    """
+    """Return the commands for a model file, less corrected where the model knows less."""
     content, twin = diagnosis_of(path), build_twin(robot, path, mended=True)
     model = Predictor(twin, read_posterior(robot, path) if content else None)
     stored = read_model(robot, path) if 'model' in content else None
@@ -287,11 +273,7 @@ def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
 def write_compensated(
     path: Path | str, made: Compensated, recording: Recording, *, storage: str = 'mcap'
 ) -> None:
-    """
-    Write the commands, where the model has the tool under them, and how sure it is.
-
-    Raises DataError: the path exists or cannot be written.
-    """
+    """Write the commands, where the model has the tool under them, and how sure it is."""
     twin = made.model.twin
     commands = replace(recording, joints=made.result.motion, measured=None)
     poses = twin.poses(commands, commands.joints.t)
@@ -328,11 +310,7 @@ COLUMNS = 't_s,x_m,y_m,z_m,dx_m,dy_m,dz_m,d_m'
 
 
 def write_table(path: Path | str, recording: Recording, off: Array) -> None:
-    """
-    Write measured positions and their deviations, shape (M, 3) [m], as CSV.
-
-    Raises DataError: the file exists or cannot be written.
-    """
+    """Write measured positions and their deviations, shape (M, 3) [m], as CSV."""
     measured = recording.measured
     assert measured is not None
     write_numbers(path, COLUMNS, [measured.t, measured.position, off, deviation(off)])

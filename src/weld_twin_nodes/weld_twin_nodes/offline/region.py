@@ -61,8 +61,6 @@ def region(
     given: ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
     context: for programs; with the frames of the program alone where left out.
     language: of a program, where its file does not tell it.
-
-    Raises DataError: the region is none of these, or the arm does not reach it.
     """
     if Path(given).is_dir():
         q = read_recording(given, robot).joints.q

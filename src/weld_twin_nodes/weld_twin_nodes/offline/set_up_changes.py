@@ -43,11 +43,7 @@ class SetUpChange:
 
 
 def set_up_change(text: str) -> SetUpChange:
-    """
-    Return a change from words: 'load=5', 'load=5,0,0,0.1', 'tool' or 'instrument'.
-
-    Raises DataError: it is none of these.
-    """
+    """Return a change from words: 'load=5', 'load=5,0,0,0.1', 'tool' or 'instrument'."""
     kind, _, rest = text.partition('=')
     try:
         numbers = tuple(float(part) for part in rest.split(',')) if rest else ()
@@ -73,7 +69,6 @@ def with_changes(
 
     ``recordings``: the first is what the others are compared with. ``changes``: by recording,
     counted from 0. ``robot``: as it is without the changes.
-    Raises DataError: the first recording is said to differ.
     """
     differs = {change.kind for change in changes.values()} & set(FRAMES)
     if 0 in changes and changes[0].kind in FRAMES:

@@ -150,11 +150,7 @@ def write_simulation(
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
 ) -> Mapping[str, float]:
-    """
-    Write a bag with what the live nodes would publish; return the last metrics.
-
-    Raises DataError: the path exists or cannot be written, or no measurement meets the twin.
-    """
+    """Write a bag with what the live nodes would publish; return the last metrics."""
     made = {
         'version': __version__,
         'robot': simulation.real.robot.to_mapping(),

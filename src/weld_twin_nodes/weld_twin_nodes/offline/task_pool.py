@@ -219,7 +219,6 @@ def pool_of(scheduler: str = '', workers: int = 0, ahead: str = '') -> Pool:
 
     ``scheduler``: address of the cluster; empty for this machine. ``workers``: processes of this
     machine; 0 means one for every core. ``ahead``: a module that these begin to import at once.
-    Raises DataError: a negative number of workers.
     """
     if workers < 0:
         raise DataError(f'the number of workers must not be negative, got {workers}')

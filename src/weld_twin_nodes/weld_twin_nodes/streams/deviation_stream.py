@@ -75,11 +75,7 @@ class Pairing:
         return len(self._measured)
 
     def add_twin(self, stamp: int, position: Array) -> list[Pair]:
-        """
-        Take a twin pose; return the pairs it completes.
-
-        Raises DataError: the stamp is not after the last one.
-        """
+        """Take a twin pose; return the pairs it completes."""
         if self._twin_order.restarted_at(stamp):
             self._twin.clear()
             self.restarts += 1
@@ -87,11 +83,7 @@ class Pairing:
         return self._complete()
 
     def add_measured(self, stamp: int, position: Array) -> list[Pair]:
-        """
-        Take a measurement; return the pairs it completes.
-
-        Raises DataError: the stamp is not after the last one.
-        """
+        """Take a measurement; return the pairs it completes."""
         if self._measured_order.restarted_at(stamp):
             self.dropped += len(self._measured)
             self._measured.clear()

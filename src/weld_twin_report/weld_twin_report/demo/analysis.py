@@ -131,12 +131,7 @@ EACH = (JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, TWIN_POSE, DEVIATION)
 
 
 def run_live(job: Job, progress: Progress) -> None:
-    """
-    Run the motion through the nodes, at the speed they keep up with, and record it.
-
-    Raises TwinError: a node failed or stood still, or the recording is not complete; the message
-    says what is missing.
-    """
+    """Run the motion through the nodes, at the speed they keep up with, and record it."""
     job.bag = job.folder / 'bag'
     samples = job.plan.motion.t.size
     try:

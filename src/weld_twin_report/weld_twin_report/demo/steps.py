@@ -84,7 +84,6 @@ def run_demo(out: Path | str, *, closed_loop: bool = False, force: bool = False)
 
     ``closed_loop``: weld the seam again through the compensator, on an arm without play.
     ``force``: as `new_directory` takes it.
-    Raises TwinError: the directory cannot be made, or a step fails.
     """
     console = Console()
     robot = catalog.load(ROBOT)

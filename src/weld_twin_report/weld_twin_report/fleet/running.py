@@ -101,11 +101,7 @@ def _content(name: str) -> str:
 
 
 def read_list(path: Path | str) -> list[Listed]:
-    """
-    Return the lines of a list.
-
-    Raises DataError: it is no table with these columns; the sentence names line and column.
-    """
+    """Return the lines of a list."""
     file = Path(path)
     names = [field.name for field in fields(Listed)]
     try:

@@ -64,9 +64,6 @@ class Database:
     make: whether an empty database, or a file that is not there, becomes a history.
     patience: seconds for which a write is tried again while the database cannot be used; a minute
     unless given.
-
-    Raises DataError: SQLAlchemy is not installed, or the database cannot be opened or is no
-    history.
     """
 
     def __init__(self, url: str, *, make: bool = True, patience: float | None = None) -> None:

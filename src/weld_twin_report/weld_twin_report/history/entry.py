@@ -69,11 +69,7 @@ class Entry:
 
 
 def instant(text: str) -> datetime:
-    """
-    Return the instant that a text names, UTC where it does not say.
-
-    Raises DataError: it is no date, or one before `FIRST_YEAR`.
-    """
+    """Return the instant that a text names, UTC where it does not say."""
     try:
         # Python 3.10 does not read the Z that others write for UTC.
         at = datetime.fromisoformat(f'{text[:-1]}+00:00' if text[-1:] in 'Zz' else text)
@@ -94,8 +90,6 @@ def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
 
     ``path``: a ``diagnosis.json``, or the directory that holds it. ``at``: when it was recorded;
     left out, the stamps of the recording tell.
-    Raises ModelError: it is no diagnosis. Raises DataError: it lacks what a history needs; the
-    sentence says what.
     """
     file = Path(path)
     file = file / 'diagnosis.json' if file.is_dir() else file
@@ -154,11 +148,7 @@ def _impossible(value: Array, prior: Array, covariance: Array) -> str:
 
 
 def date_of_stamp(epoch_ns: int, file: Path) -> datetime:
-    """
-    Return the date of a stamp [ns].
-
-    Raises DataError: it is counted from the start of a machine.
-    """
+    """Return the date of a stamp [ns]."""
     at = datetime.fromtimestamp(epoch_ns // NANOSECONDS, timezone.utc)
     if at.year < FIRST_YEAR:
         raise DataError(

@@ -60,11 +60,7 @@ def engine_of(address: Any) -> Engine:
 
 
 def refuse_missing(address: Any, shown: str) -> None:
-    """
-    Refuse to read an SQLite file that is not there, which opening would make.
-
-    Raises DataError: there is no such file.
-    """
+    """Refuse to read an SQLite file that is not there, which opening would make."""
     name = address.database or ''
     plain = address.get_backend_name() == 'sqlite' and not name.startswith('file:')
     if plain and not Path(name).exists():
@@ -77,8 +73,6 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
 
     ``shown``: the database, as people may read it. ``make``: whether an empty database may become
     a history.
-    Raises DataError: it is empty and nothing may be made, it is of a newer version, or of another
-    application.
     """
     import sqlalchemy
 

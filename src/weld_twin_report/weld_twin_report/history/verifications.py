@@ -37,11 +37,7 @@ class Verified(NamedTuple):
 
 
 def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None:
-    """
-    Return the verification that a file or a folder holds; None where it holds none.
-
-    Raises DataError: it cannot be read, or its stamps are no dates and none is given.
-    """
+    """Return the verification that a file or a folder holds; None where it holds none."""
     file = Path(path)
     file = file / FILE if file.is_dir() else file
     if file.name != FILE or not file.is_file():
@@ -59,12 +55,7 @@ def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None
 def put_verified(
     database: Database, connection: Connection, cell: str, result: Verified
 ) -> int | None:
-    """
-    Add a verification within a transaction; return its number, None if it was there already.
-
-    Raises DataError: there is no such cell yet, it has another robot, or the recording with another
-    date.
-    """
+    """Add a verification within a transaction; return its number, None if it was there already."""
     sql, cells, rows = database.sql, database.table('cells'), database.table('verifications')
     # Whoever writes to the same cell waits here, and then sees what was written.
     query = sql.select(cells).where(cells.c.name == cell).with_for_update()

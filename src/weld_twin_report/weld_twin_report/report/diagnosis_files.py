@@ -32,11 +32,7 @@ _SETTLED_MS = 3000
 
 
 def browser() -> str:
-    """
-    Return the browser to print with.
-
-    Raises DataError: there is none.
-    """
+    """Return the browser to print with."""
     result = next(filter(None, map(shutil.which, BROWSERS)), None)
     if result is None:
         raise DataError(
@@ -47,11 +43,7 @@ def browser() -> str:
 
 
 def print_page(page: Path, out: Path) -> None:
-    """
-    Print a page to a PDF.
-
-    Raises DataError: there is no browser, or it did not print.
-    """
+    """Print a page to a PDF."""
     program = browser()
     with tempfile.TemporaryDirectory() as profile:
         command = [

@@ -116,8 +116,6 @@ def joint_labels(given: str, joints: Sequence[str]) -> dict[str, str]:
     given: a prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML
     file that gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
     joints: of the model, in chain order.
-
-    Raises ModelError: it is neither, or the file names a joint that the robot does not have.
     """
     if not given:
         return {}

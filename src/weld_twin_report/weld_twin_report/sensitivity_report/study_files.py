@@ -41,11 +41,7 @@ TASKS, FIGURES = 'tasks', 'figures'
 
 
 def study_directory(path: Path | str) -> Path:
-    """
-    Return the directory of a study, with a place for the results of its tasks.
-
-    Raises DataError: it holds something else.
-    """
+    """Return the directory of a study, with a place for the results of its tasks."""
     place = Path(path)
     if place.exists() and not place.is_dir():
         raise DataError(f"'{place}' is a file; choose another place")

@@ -41,8 +41,6 @@ class Directory:
     A directory in which this server alone works, until `close`.
 
     path: a link is followed.
-
-    Raises DataError: it holds something else, another server works in it, or it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:

@@ -190,11 +190,7 @@ COLUMNS = 'the first line of the table'
 
 
 def given(form: Mapping[str, str], commands: Iterable[str]) -> dict[str, str]:
-    """
-    Return the fields of a form that some commands take, checked.
-
-    Raises DataError: a field holds what it cannot.
-    """
+    """Return the fields of a form that some commands take, checked."""
     wanted, out = set(commands), {}
     for name, field in FIELDS.items():
         text = form.get(name, '').strip()

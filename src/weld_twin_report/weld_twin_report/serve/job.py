@@ -92,11 +92,7 @@ class Job:
 
     @classmethod
     def read(cls, folder: Path) -> Job:
-        """
-        Return the job of a folder.
-
-        Raises DataError: its file is damaged, or a newer version wrote it.
-        """
+        """Return the job of a folder."""
         try:
             if not (folder / FILE).is_file():  # a pipe would be waited for
                 raise ValueError('it is no file')
@@ -127,11 +123,7 @@ class Job:
             raise ValueError('its times are impossible')
 
     def write(self, folder: Path) -> None:
-        """
-        Write it into its folder, whole.
-
-        Raises OSError: the disk is full, or does not take it.
-        """
+        """Write it into its folder, whole."""
         try:
             write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)
         except DataError as error:

@@ -239,7 +239,6 @@ async def save_program(
 
     ``model``: a ``diagnosis.json``, and a robot file; none where a recording's are taken.
     ``place`` and ``beside``: for the program, in a new folder of its title; for the model.
-    Raises DataError: there is no program, or a file is of no kind that is read.
     """
     names = _names(uploads, PROGRAMS, 'a program nor a file that belongs to one', 8)
     if not names:

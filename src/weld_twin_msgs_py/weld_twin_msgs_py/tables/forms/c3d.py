@@ -25,12 +25,7 @@ def is_c3d(data: bytes) -> bool:
 
 
 def read_c3d(path: Path, data: bytes, marker: str | None) -> Read:
-    """
-    Return time and place of one marker of a C3D file.
-
-    Raises DataError: the library for it is missing, the file is damaged, or several markers were
-    tracked.
-    """
+    """Return time and place of one marker of a C3D file."""
     try:
         import c3d
     except ImportError:

@@ -31,11 +31,7 @@ def is_positions(text: str) -> bool:
 
 
 def read_positions(path: Path, text: str, marker: str | None) -> Read:
-    """
-    Return the joints of the arm, a row for each time that they were fetched.
-
-    Raises DataError: a position lacks joints that another one has.
-    """
+    """Return the joints of the arm, a row for each time that they were fetched."""
     rows, lines = list[list[str]](), list[int]()
     starts = [result.start() for result in _MARK.finditer(text)]
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):

@@ -30,12 +30,7 @@ from 1, and what is added to every value and multiplied with it (start and step 
 
 
 def read_trace(path: Path, text: str, marker: str | None) -> Read:
-    """
-    Return the channels of a trace, those as long as its time.
-
-    Raises DataError: a file of values is missing or holds another number of them, or is of another
-    type.
-    """
+    """Return the channels of a trace, those as long as its time."""
     result = [
         dict(re.findall(r'^\s*(\d{3}),\s*(.*?)\s*$', block, re.M))
         for block in re.findall(r'#BEGINCHANNELHEADER(.*?)#ENDCHANNELHEADER', text, re.S)

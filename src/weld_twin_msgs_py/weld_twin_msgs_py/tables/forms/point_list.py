@@ -44,8 +44,6 @@ def read_point_list(path: Path, text: str, marker: str | None) -> Read:
     """
     Return the points of a list; of nominal and measured points the measured ones.
 
-    Raises DataError: no point belongs to the group, or a line differs from the others.
-
     marker: the group of points that is meant.
     """
     rows = _rows(text)

@@ -38,11 +38,7 @@ def drawable(setting: Setting) -> tuple[str, ...]:
 
 
 def draw(setting: Setting, key: str) -> Drawing | None:
-    """
-    Return a figure; None where the recording holds no measurements to draw.
-
-    Raises DataError: there is no such figure, or not for this setting.
-    """
+    """Return a figure; None where the recording holds no measurements to draw."""
     if key not in FIGURES:
         raise DataError(f'no figure is called {key!r}; there are ' + ', '.join(FIGURES))
     if key not in drawable(setting):

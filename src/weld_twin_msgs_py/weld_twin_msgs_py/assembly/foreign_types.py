@@ -134,9 +134,6 @@ class FedBack:
     Turns what a controller says of its joints into the pose that the arm had then.
 
     Compared with the twin of what was commanded, it shows the servo's own part of a gap.
-
-    part: of the message; empty for what is fed back.
-    joint_names: what the controller calls the joints.
     """
 
     def __init__(
@@ -162,12 +159,7 @@ def split_topic(name: str) -> tuple[str, str]:
 
 
 def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
-    """
-    Return the plain messages that a message stands for, itself where it is one.
-
-    kind: its type.
-    part: the child frame of a transform, or the part of a controller's state, that is meant.
-    """
+    """Return the plain messages that a message stands for; ``part``: a child frame, or of a state."""
     turn = FOREIGN.get(kind)
     return (message,) if turn is None else tuple(turn(message, part))
 
@@ -175,11 +167,7 @@ def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
 def plain_poses(
     kind: str, message: Any, part: str = '', fed_back: FedBack | None = None
 ) -> tuple[Any, ...]:
-    """
-    Return the poses that a message stands for; as `plain_messages`.
-
-    fed_back: turns what a controller feeds back; None where the robot is not known.
-    """
+    """Return the poses that a message stands for; ``fed_back`` has the robot, where it is known."""
     if kind == CONTROLLER and fed_back is not None:
         return tuple(fed_back(message))
     return plain_messages(kind, message, part)

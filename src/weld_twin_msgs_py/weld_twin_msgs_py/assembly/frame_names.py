@@ -34,17 +34,7 @@ def plain_name(frame_id: str, robot: Robot) -> str:
 
 
 class MeasuringFrame:
-    """
-    The frame of a stream of measurements: the one that is expected, else the first that comes.
-
-    expected: empty for any.
-
-    Attributes
-    ----------
-    remark : str
-        What to report about the frame once it is known.
-
-    """
+    """The frame of a stream of measurements: the one expected, else the first that comes."""
 
     what, means = 'measurement', 'the measuring frame'
     named_by, other = 'measuring_frame', 'measuring_frame and T_measuring_base'
@@ -55,11 +45,7 @@ class MeasuringFrame:
         self.remark = ''
 
     def take(self, frame_id: str) -> None:
-        """
-        Take the frame of a measurement.
-
-        Raises OtherFrame: it is neither the frame expected nor that of the measurements before.
-        """
+        """Take the frame of a measurement; raise OtherFrame where it is not that of the others."""
         if frame_id == self._frame_id:
             return
         name = frame_id.strip('/')
@@ -95,15 +81,7 @@ class WrenchFrame:
     One of `TOOL_NAMES` means the tool, one of `BASE_NAMES` the base, one of `MEASURING_NAMES` the
     base too where it is not turned against the measuring frame. A name that holds the word base
     but is none of these is refused, for it may be either; every other name is taken for the
-    tool's, and that is reported.
-
-    Attributes
-    ----------
-    meaning : str
-        'tool' until a wrench came.
-    remark : str
-        What to report about the name; empty where it is known.
-
+    tool's, and `remark` tells it.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -113,12 +91,7 @@ class WrenchFrame:
         self.remark = ''
 
     def take(self, frame_id: str) -> None:
-        """
-        Take the frame of a wrench.
-
-        Raises OtherFrame: it is not the frame of the wrenches before. Raises DataError: the name
-        does not tell which frame is meant.
-        """
+        """Take the frame of a wrench; raise OtherFrame where others had another."""
         if frame_id == self._frame_id:
             return
         meaning, remark = self._read(frame_id)

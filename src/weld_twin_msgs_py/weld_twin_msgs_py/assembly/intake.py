@@ -55,12 +55,9 @@ class Taken(NamedTuple):
 
 class Intake:
     """
-    Takes the messages of one cell.
+    Takes the messages of one cell; what it is given is explained in `JointStates`.
 
-    robot: its joint names pick the columns.
-    limits: whether joint positions beyond the limits are refused; see `JointStates`.
     measuring_frame: what poses and points must be given in; empty for the first frame that comes.
-    joint_names, mend, efforts: see `JointStates`.
     """
 
     def __init__(
@@ -126,8 +123,7 @@ class Intake:
         """
         Return the sample that a message gives, None if joints of other messages are awaited.
 
-        Raises Unstamped, Late, Incomplete, OtherFrame: the sample is to be left out, the stream
-        goes on. Raises DataError: the message cannot be used.
+        After Unstamped, Late, Incomplete and OtherFrame the stream goes on without the sample.
         """
         if role is Role.JOINTS:
             return self._joints(message)

@@ -25,9 +25,8 @@ class Beside:
     """
     Keeps the joints of messages that are none of the robot's, and which of them move.
 
-    robot: its name.
-    own: its joints. Where all of them come behind another prefix, too, these are another robot's;
-    one alone is not: controllers call the track of a robot `rail_joint_1`, or `group_2/joint_1`.
+    Where all of its own come behind another prefix, too, these are another robot's; one alone is
+    not: controllers call the track of a robot `rail_joint_1`, or `group_2/joint_1`.
     """
 
     def __init__(self, robot: str, own: Sequence[str]) -> None:
@@ -66,11 +65,7 @@ class Beside:
         )
 
     def warning(self, known: Collection[str] = ()) -> str:
-        """
-        Return which of them move, in a sentence; empty where none does.
-
-        known: those that do not carry the arm.
-        """
+        """Return which of them move and do not carry the arm, in a sentence; empty for none."""
         moving = sorted(set(self.moving).difference(known))
         if not moving:
             return ''
@@ -93,11 +88,7 @@ _SLACK = 1e-6
 def names_called(
     robot: Robot, prefix: str = '', called: Mapping[str, str] | None = None
 ) -> tuple[str, ...] | None:
-    """
-    Return what joint states call the joints of a robot; None where nothing is said of it.
-
-    called: joints of the robot, and what they are called behind the prefix.
-    """
+    """Return what joint states call the joints of a robot; None where nothing is said of it."""
     given = called or {}
     if not prefix and not given:
         return None
@@ -122,11 +113,7 @@ def _picker(index: Sequence[int]) -> Callable[[Any], tuple[float, ...]]:
 
 
 class JointSample(NamedTuple):
-    """
-    Stamp [ns], positions (n,), velocities (n,), None where the controller tells none; efforts (n,).
-
-    Efforts are None where nobody asked for them.
-    """
+    """Stamp [ns], positions and velocities (n,), None without; efforts (n,) where asked for."""
 
     stamp: int
     q: Array
@@ -154,23 +141,11 @@ class JointStates:
     recording is read with them, for they tell of swapped joints and of degrees taken for radians.
     joint_names: what the joint states call the joints of the robot, in its order; left out, as the
     robot does, or with one prefix.
-    efforts: whether every joint state has to tell the measured efforts of the joints.
     mend: whether velocities are left out that stay zero while joints move. A running node does; of
     a recording it is reported as such.
 
-    Attributes
-    ----------
-    others : int
-        Messages that hold no joint of the robot.
-    strangers : dict of str
-        Names of the joints in those messages, in their order.
-    parts : int
-        Messages that hold some joints and wait for the rest.
-    beside : Beside
-        The joints that are none of the robot's.
-    remark, velocity_remark : str
-        What to report about names and velocities; empty where there is nothing.
-
+    Counted are messages with no joint of the robot (`others`, their joints `strangers`), and with
+    some, which wait for the rest (`parts`).
     """
 
     def __init__(
@@ -218,8 +193,7 @@ class JointStates:
         """
         Return the sample that a message completes, None if it completes none.
 
-        Raises Incomplete: joints are missing and will not come any more. Raises DataError: the
-        message cannot be used.
+        Raises Incomplete: joints are missing and will not come any more.
         """
         sample = self._taken(message)
         if sample is not None and self.efforts:
@@ -244,12 +218,7 @@ class JointStates:
         return self._zeros
 
     def _taken(self, message: Any) -> JointSample | None:
-        """
-        Return the sample as the message has it.
-
-        Raises Incomplete: joints are missing and will not come any more. Raises DataError: the
-        message cannot be used.
-        """
+        """Return the sample as the message has it; raise Incomplete as `take` does."""
         stamp = from_messages.stamp_ns(message)
         # A node's decoder repeats the very object, which is quicker than to compare the names.
         if message.name is self._usual or message.name == self._usual:
@@ -281,11 +250,7 @@ class JointStates:
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
 
     def _take_own_names(self, message: Any) -> bool:
-        """
-        Go back to the robot's own names where they come after all, in a running node.
-
-        What had a prefix was another robot's then.
-        """
+        """Go back to the robot's own names where they come: the prefix was another robot's."""
         own = self._robot.joint_names
         if not self._mend or self._given or self._names == own:
             return False

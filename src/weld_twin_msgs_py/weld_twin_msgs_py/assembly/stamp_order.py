@@ -11,15 +11,7 @@ RESTART_AFTER = 10
 
 
 class Late(DataError):
-    """
-    The stamp of a sample is not after the last one of its stream.
-
-    Attributes
-    ----------
-    behind : int [ns]
-        How far it is behind; 0 for a stamp that repeats.
-
-    """
+    """The stamp of a sample is so far [ns] behind the last one of its stream; 0 if it repeats."""
 
     def __init__(self, sentence: str, behind: int = 0) -> None:
         super().__init__(sentence)
@@ -36,22 +28,14 @@ class Forward:
         self._late = 0
 
     def reset(self) -> None:
-        """
-        Begin anew, as after a jump of the clock.
-
-        What the run before still had under way shows by its stamps: they go on where it was.
-        """
+        """Begin anew, as after a jump of the clock; what was under way has stamps that go on."""
         self._ended = self._ended if self.last is None else self.last
         self.last = None
         self._behind.clear()
         self._late = 0
 
     def restarted_at(self, stamp: int) -> bool:
-        """
-        Take a stamp; return whether it begins a new run, as when a bag is played again.
-
-        Raises Late: the stamp is not after the last one.
-        """
+        """Take a stamp; return whether it begins a new run, as of a bag played again, or raise Late."""
         if self.last is None and self._ended is not None and stamp > self._ended:
             self._late += 1
             if self._late < RESTART_AFTER:

@@ -45,11 +45,7 @@ class NotYet(NoTransform):
 
 
 class StampedPose(NamedTuple):
-    """
-    Where a frame is in its parent.
-
-    Most are never asked for, so that the numbers stay as they came.
-    """
+    """Where a frame is in its parent, in numbers as they came: most are never asked for."""
 
     stamp: int
     """[ns]"""
@@ -142,11 +138,7 @@ class TransformTree:
         self._branches = {k: each for k, each in self._branches.items() if each.static}
 
     def take(self, message: Any, *, static: bool = False) -> None:
-        """
-        Take the transforms of a message.
-
-        Raises DataError: one of them is none, or makes a loop; all others are taken.
-        """
+        """Take the transforms of a message; refuse one that is none only when the others are taken."""
         wrong: DataError | None = None
         for each in message.transforms:
             parent, child = each.header.frame_id.strip('/'), each.child_frame_id.strip('/')
@@ -201,11 +193,7 @@ class TransformTree:
         return self._inverse(self._product(up[: up.index(common)], stamp)) @ to_common
 
     def latest(self, target: str, source: str) -> Array:
-        """
-        Return T_target_source, shape (4, 4), at the last time that all of the way is known.
-
-        Raises NoTransform: no transforms join the two.
-        """
+        """Return T_target_source, shape (4, 4), at the last time that all of the way is known."""
         way = {target, *self._above(target)} ^ {source, *self._above(source)}
         branches = [self._branches[name] for name in way if name in self._branches]
         last = [branch.places[-1].stamp for branch in branches if not branch.static]

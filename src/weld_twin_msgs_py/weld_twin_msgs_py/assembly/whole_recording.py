@@ -147,10 +147,8 @@ def assembled(
     Return the recording that streams make; it counts from the first joint state.
 
     streams: rows as `Intake` gives them, the joints among them. Poses are used before points.
-    wrench_frame: 'tool' or 'base'.
     static: whether the joint states are stations at rest; None looks at the stamps.
     one_clock: refuse measurements that have no time in common with the joint states.
-    notes: what is to be said of the streams.
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])
@@ -196,11 +194,7 @@ def seconds(ns: np.ndarray, epoch: int) -> Array:
 
 
 def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | None]:
-    """
-    Return the joint stream, and its efforts where they were read.
-
-    Velocities some messages lack are steps since the one before.
-    """
+    """Return the joint stream, with steps for velocities that lack, and its efforts if read."""
     t, n = seconds(joints.ns, int(joints.ns[0])), robot.n
     q, qd, effort = joints.rows[:, :n], joints.rows[:, n : 2 * n], joints.rows[:, 2 * n :]
     effort_signal = JointSignal(t, effort) if effort.size else None

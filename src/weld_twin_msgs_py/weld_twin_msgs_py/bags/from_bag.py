@@ -71,8 +71,7 @@ def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) ->
     """
     Return the recording as stations, one for every contact.
 
-    recording: with the joint states, as they came.
-    made: how the bag was made; may hold the artefact. Without one every label is a point, or a
+    What says how the bag was made may hold the artefact. Without one every label is a point, or a
     length where the messages hold one.
     """
     ns = np.array([mark.ns for mark in each])

@@ -41,13 +41,9 @@ NOTES = 'provenance.json'
 
 class GrowingBag:
     """
-    A bag being recorded.
+    A bag being recorded; neither it nor the unfinished one of its name may exist.
 
-    path: must not exist yet, and neither must the unfinished bag of that name.
-    storage: 'mcap' or 'sqlite3'.
-    split_bytes: about how large a file may become; 0 is without limit.
-    split_ns: what time a file may span [ns]; 0 is without limit.
-    provenance: as of `BagWriter`.
+    Files become about so many bytes large, or span so many ns; 0 is without limit.
     """
 
     def __init__(
@@ -205,9 +201,7 @@ class BackgroundBag:
     """
     Writes in a thread of its own; what does not fit into the queue is dropped and counted.
 
-    bag: this opens and closes it.
     flush_every: longest time a message is only in memory while the disk keeps up [s].
-    most_bytes: memory the queue may take.
     """
 
     def __init__(self, bag: GrowingBag, *, flush_every: float, most_bytes: int) -> None:

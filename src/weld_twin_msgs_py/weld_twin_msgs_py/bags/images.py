@@ -50,13 +50,7 @@ def images(bag: BagReader, names: TopicNames) -> list[Image]:
 def looking(
     recording: Recording, each: Sequence[Image], names: TopicNames, made: Mapping[str, Any]
 ) -> Recording:
-    """
-    Return the recording with poses that its images tell.
-
-    recording: with the joint states.
-    names: may describe cameras and targets.
-    made: how the bag was made; may describe them too.
-    """
+    """Return the recording with poses that its images tell."""
     cameras, targets = _described(names, made)
     stamps = sorted({ns for ns, _, _ in each})
     whole = np.concatenate(_rows(each, stamps, cameras, targets))

@@ -54,11 +54,7 @@ def allowed(packed: int) -> int:
 
 
 def unzstd(data: bytes, size: int | None = None) -> bytes:
-    """
-    Return the content of a zstd frame.
-
-    size: what is declared beside it.
-    """
+    """Return the content of a zstd frame, of a declared size."""
     limit = _limit(data, size)
     return _whole(zstd.ZstdDecompressor().decompress(data, limit + 1), limit)
 
@@ -156,11 +152,7 @@ class BagReader:
         self._stack = ExitStack()
 
     def __enter__(self) -> BagReader:
-        """
-        Open the storage.
-
-        Raises DataError: nothing is there, it is no bag, or it is damaged.
-        """
+        """Open the storage."""
         try:
             with clear_errors(self.path):
                 bag = look(self.path)
@@ -208,11 +200,7 @@ class BagReader:
                     yield connection.topic, connection.msgtype, log_ns, whole
 
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
-        """
-        Yield topic, stamp [ns] and whether it is the header's, of every message, undecoded.
-
-        A message without a header, or of an unknown type, gives the time of its recording.
-        """
+        """Yield topic, stamp [ns], and whether that is the header's or of the recording."""
         with clear_errors(self.path):
             for reader in self._readers:
                 stamped = {c.id: has_header(c.msgtype) for c in reader.connections}

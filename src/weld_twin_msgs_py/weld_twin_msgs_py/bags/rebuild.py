@@ -168,8 +168,7 @@ def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
     """
     Open a database as it is, or as a copy that can be mended.
 
-    Opening undoes a step that was half done; half a page at the end is cut off, for it would
-    read as half a message and zeros.
+    Half a page at the end is cut off, for it would read as half a message and zeros.
     """
     journals = [file for file in _beside(path) if file.exists()]
     partial_page = path.stat().st_size % _page(path)

@@ -136,11 +136,7 @@ class _Topic:
         self._waiting: list[bytes] = []
 
     def take(self, kind: str, data: bytes, bag: BagReader, intake: Intake) -> None:
-        """
-        Take a message; it is read with those that follow.
-
-        Raises Unusual: one of them has to be looked at by itself.
-        """
+        """Take a message; raise Unusual where one has to be looked at by itself."""
         if kind != self._kind:
             raise Unusual
         self._waiting.append(data)
@@ -148,11 +144,7 @@ class _Topic:
             self.read_waiting(bag, intake)
 
     def read_waiting(self, bag: BagReader, intake: Intake) -> None:
-        """
-        Read the messages that were taken and not read yet.
-
-        Raises Unusual: one of them has to be looked at by itself.
-        """
+        """Read the messages that wait; raise Unusual where one has to be looked at by itself."""
         data, self._waiting = self._waiting, []
         if not data:
             return
@@ -198,16 +190,9 @@ def fill_regular(
     bag: BagReader, roles: Mapping[str, Role], streams: Mapping[Role, Stream], intake: Intake
 ) -> bool:
     """
-    Fill the columns of some topics, if all of them are as usual.
+    Fill the empty columns of topics if all are as usual; return whether that is so.
 
-    bag: open.
-    streams: empty; to be thrown away, with the intake, where this fails.
-
-    Returns
-    -------
-    bool
-        Whether they hold the whole recording now.
-
+    Where they do not, the columns and the intake are to be thrown away.
     """
     topics = {
         topic: _Topic(streams[role], role, bag.topics[topic][0]) for topic, role in roles.items()
@@ -223,11 +208,7 @@ def fill_regular(
 
 
 def _joint_rows(runs: list[Array], index: list[int], width: int) -> Array:
-    """
-    Return positions, velocities and, in rows so wide, efforts.
-
-    A state that does not tell every velocity tells none.
-    """
+    """Return positions, velocities (none where one lacks) and, in rows so wide, efforts."""
     position, velocity = runs[0][:, index], runs[1]
     if velocity.shape[1] == runs[0].shape[1]:
         velocity = velocity[:, index]

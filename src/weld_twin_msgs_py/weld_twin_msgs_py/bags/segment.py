@@ -107,12 +107,7 @@ class Channel(NamedTuple):
 
 
 class Segment:
-    """
-    A storage file being written.
-
-    folder: directory to make for it; the file in it has the same name and the storage's suffix.
-    storage: 'mcap' or 'sqlite3'.
-    """
+    """A storage file being written, in a directory that is made for it."""
 
     def __init__(self, folder: Path, storage: str) -> None:
         self.folder = folder
@@ -232,7 +227,6 @@ def clear_write_errors(path: Path, remaining: Callable[[], str] = str) -> Iterat
     """
     Turn what a full or missing disk makes the storages raise into one sentence.
 
-    path: the bag that is written.
     remaining: returns what is to be said behind it, by the time that it happens.
     """
     try:
@@ -272,9 +266,6 @@ class Segments:
     The storage files of a bag, NAME_0, NAME_1 and so on.
 
     The one that grows lies in a directory of its own and joins the others when it is complete.
-
-    folder: directory of the bag; exists.
-    name: what the files are called.
     """
 
     def __init__(self, folder: Path, name: str, storage: str) -> None:
@@ -358,12 +349,7 @@ SPARE = 10_000_000
 
 
 def recover_command(path: Path, growing: Path | None = None) -> str:
-    """
-    Return ``weld-twin bag recover`` for a recording, onto another disk where its own has no room.
-
-    path: what the recorder was told to write.
-    growing: the directory it grew in; it is copied.
-    """
+    """Return ``weld-twin bag recover`` for a recording, from where it grew if that has no room."""
     command = ['weld-twin', 'bag', 'recover', str(path)]
     needed = _size(path if growing is None else growing) + SPARE
     if not _has_room(path.parent, needed):

@@ -38,8 +38,7 @@ def look(path: Path) -> Bag:
     """
     Return what a path to a bag stands for.
 
-    Raises DataError: nothing is there, it is no bag, or it is not finished. Raises ValueError,
-    KeyError, TypeError, OSError, yaml.YAMLError: its metadata is damaged.
+    Raises ValueError, KeyError, TypeError, OSError, yaml.YAMLError: its metadata is damaged.
     """
     refuse_unfinished(path)
     if path.suffix == '.bag' and not path.is_dir():

@@ -26,12 +26,8 @@ from .segment import Channel, Segment, check_storage, clear_write_errors
 
 class BagWriter:
     """
-    A bag being written; a context manager, or `open` and `close` (or `discard`) by hand.
+    A bag being written, or discarded where its block is left by an exception.
 
-    Leaving the block by an exception discards everything.
-
-    path: must not exist yet. A link that leads nowhere yet is followed.
-    storage: 'mcap' or 'sqlite3'.
     provenance: how the bag came about (robot, effects, seed, version); plain JSON values, kept in
     the bag's ``custom_data`` and read back by `provenance`.
     beside: texts that lie in the bag's directory, by name of the file.
@@ -61,11 +57,7 @@ class BagWriter:
         return self
 
     def write(self, topic: str, message: Any, log_ns: int | None = None) -> None:
-        """
-        Write a message made by `bag_messages`.
-
-        log_ns: when it was recorded [ns]; left out, its header stamp.
-        """
+        """Write a message of `bag_messages`, recorded at a time [ns] or else at its stamp."""
         kind = message.__msgtype__
         when = stamp_ns(message) if log_ns is None else log_ns
         self.write_cdr(topic, kind, bytes(TYPES.serialize_cdr(message, kind)), when)

@@ -16,11 +16,7 @@ _GUARD = "'"
 
 
 def csv_text(header: Sequence[Any], rows: Iterable[Sequence[Any]]) -> str:
-    """
-    Return a table as text; floats read back exactly.
-
-    rows: of texts and numbers.
-    """
+    """Return a table of texts and numbers as text; floats read back exactly."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator='\n')
     writer.writerow([guarded(cell) for cell in header])

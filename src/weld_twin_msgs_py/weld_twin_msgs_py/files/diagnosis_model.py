@@ -168,23 +168,10 @@ def mended_source(
     model: Model, nominal: Robot, recording: Recording, setup: int = 0
 ) -> tuple[Recording, str]:
     """
-    Return a recording mended as a diagnosis mended its own, and what to report about it.
+    Return a recording mended as a diagnosis mended its own, and a sentence about it, or ''.
 
     Where something was measured, the measurements tell whether it needs that: a source that was
     put right meanwhile is left as it is.
-
-    Raises ModelError: the file's corrections do not fit the recording.
-
-    model: as `read_model` returns it.
-    nominal: the robot that was given.
-    setup: which recording of the diagnosis it is, counted from 0.
-
-    Returns
-    -------
-    recording : Recording
-    remark : str
-        A sentence; empty where nothing had to be mended.
-
     """
     if not model.mends:
         return recording, ''
@@ -211,14 +198,7 @@ def _gap(twin: Twin, recording: Recording) -> float:
 
 
 def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
-    """
-    Return the twin of a diagnosis file: fitted frames, effects given and effects found.
-
-    robot: the nominal robot that was diagnosed.
-    path: diagnosis.json.
-    setup: which recording's base frame, in the order of the diagnosis; they differ where the
-    set-up moved between recordings.
-    """
+    """Return the twin of a diagnosis file: the frames of a set-up, effects given and found."""
     model = read_model(robot, path)
     if not 0 <= setup < len(model.bases):
         raise ModelError(
@@ -231,8 +211,7 @@ def timed(path: Path | str, model: Model, setup: int, recording: Recording) -> T
     """
     Return the twin of one set-up of a diagnosis file, for a recording at its time.
 
-    How the set-up itself moved is applied where the recording overlaps with the one diagnosed,
-    and left out elsewhere.
+    How the set-up itself moved is applied where the recording overlaps with the one diagnosed.
     """
     stored = read_diagnosis(path)['model']
     twin = model.twin(setup)

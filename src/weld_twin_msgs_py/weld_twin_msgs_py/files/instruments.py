@@ -69,11 +69,7 @@ def instrument(given: str) -> Instrument:
 
 
 def measured_by(recording: Recording, what: Instrument, *, own_frame: bool) -> Recording:
-    """
-    Return a recording whose measurements are as sure as an instrument's.
-
-    own_frame: whether the measuring frame is the instrument's own.
-    """
+    """Return a recording whose measurements are as sure as an instrument's."""
     seen = recording.measured
     if seen is None:
         return recording

@@ -31,11 +31,9 @@ PEAK_VELOCITY, PEAK_ACCELERATION = 1.875, 5.7735
 
 def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> None:
     """
-    Write a motion as a path file of kind 'joints'.
+    Write a motion as a path file of kind 'joints', with a line on what it is for.
 
-    motion: 'static', 'joint_names', 't' [s] and 'q' [rad, m]; static is stations, each measured at
-    rest, ``t`` when.
-    comment: one line, what it is for.
+    motion: 'static', 'joint_names', 't' [s] and 'q' [rad, m]; of stations, when each is measured.
     """
     content = {
         'kind': KIND,
@@ -47,11 +45,7 @@ def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> N
 
 
 def read_joint_motion(path: Path | str, robot: Robot) -> tuple[Array, Array, bool] | None:
-    """
-    Return times (K,) [s], positions (K, n) as the robot orders them, and whether of stations.
-
-    None where the file holds a seam.
-    """
+    """Return times (K,) [s], positions (K, n), and whether they are stations; None for a seam."""
     if Path(path).suffix.lower() not in ('.yaml', '.yml'):
         return None
     data = read_yaml(path, 'path file')
@@ -77,16 +71,7 @@ def read_joint_motion(path: Path | str, robot: Robot) -> tuple[Array, Array, boo
 
 
 def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMotion:
-    """
-    Return the motion from station to station, at rest at each for a while.
-
-    Raises PathError: it would have more samples than make sense.
-
-    t: when each is to be measured, shape (K,) [s]; the arm is late where the way or the stay takes
-    longer.
-    q: shape (K, n).
-    rate: [1/s]
-    """
+    """Return the motion through stations, each measured at its time, or as soon as it can."""
     leave, arrive = [], [0.0]
     for k, step in enumerate(np.abs(np.diff(q, axis=0))):
         way = max(

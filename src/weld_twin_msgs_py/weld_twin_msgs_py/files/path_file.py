@@ -20,13 +20,7 @@ from .yaml_file import read_text, read_yaml
 
 
 def read_path(path: FilePath | str) -> tuple[Path, Torch]:
-    """
-    Return the seam of a YAML file, or the spline through the points of a CSV file.
-
-    A CSV file has the columns x, y, z [m] with a header line.
-
-    Raises ModelError: the file cannot be read. Raises PathError: it does not describe a seam.
-    """
+    """Return the seam of a YAML file, or the spline through the x, y, z [m] of a CSV file."""
     try:
         if FilePath(path).suffix.lower() == '.csv':
             return from_mapping({'kind': 'points', 'points': _points(path)}), Torch()
@@ -43,8 +37,6 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
 
     ``external`` names joints of a positioner or a track, each with one position or with as many
     as the others, spread evenly along the seam. Joints of the chain before them stand at zero.
-
-    Raises PathError: it names no such joint, or its positions are none.
     """
     data = None if FilePath(path).suffix.lower() == '.csv' else read_yaml(path, 'path file')
     given = data.get('external') if isinstance(data, dict) else None

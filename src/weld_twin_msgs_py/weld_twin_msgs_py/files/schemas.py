@@ -242,9 +242,5 @@ NAMES = tuple(_MADE)
 
 
 def schema(name: str) -> Schema:
-    """
-    Return the JSON Schema of a kind of file.
-
-    name: one of `NAMES`.
-    """
+    """Return the JSON Schema of a kind of file, one of `NAMES`."""
     return {'$schema': DRAFT, 'title': f'weld_twin {name} file', **_MADE[name]()}

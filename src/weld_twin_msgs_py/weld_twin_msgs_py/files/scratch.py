@@ -29,9 +29,7 @@ class Scratch:
     """
     A new hidden directory; a context manager that yields its path, or `close` by hand.
 
-    parent: made if it is not there.
-    prefix: of the name, which is drawn. What killed processes left of this prefix is swept first.
-    rescue: called with every directory before it is swept.
+    What killed processes left of the same prefix is swept first, see `sweep`.
     """
 
     def __init__(
@@ -73,15 +71,7 @@ class Scratch:
 
 
 def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = None) -> None:
-    """
-    Remove the scratch directories of processes that have ended.
-
-    Parameters
-    ----------
-    rescue : callable, optional
-        Called with every directory before it goes; no other process sweeps it meanwhile.
-
-    """
+    """Remove the scratch directories of processes that have ended, rescued before."""
     own = re.compile(re.escape(prefix) + _DRAWN)
     try:
         result = [entry for entry in os.scandir(parent) if own.fullmatch(entry.name)]

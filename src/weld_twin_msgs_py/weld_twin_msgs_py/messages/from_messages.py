@@ -72,11 +72,7 @@ def joints_present(message: Any, joint_names: Sequence[str]) -> tuple[str, ...]:
 
 
 def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
-    """
-    Return joint positions, shape (n,) [rad or m], matched by name.
-
-    Order does not matter and further joints are left out.
-    """
+    """Return joint positions, shape (n,) [rad or m], matched by name."""
     index = _indices(tuple(message.name), tuple(joint_names))
     values = message.position
     if len(values) != len(message.name):
@@ -173,11 +169,7 @@ def temperature(message: Any) -> float:
 
 
 def position_sigma(message: Any) -> float | None:
-    """
-    Return one standard deviation of a PoseWithCovarianceStamped's position [m].
-
-    None where the covariance is left at zero. Axes are joined by their root mean square.
-    """
+    """Return one standard deviation of a pose's position [m]; None where it is left at zero."""
     diagonal = readonly(np.asarray(message.pose.covariance)[list(VARIANCES)], (3,), 'covariance')
     if (diagonal < 0.0).any():
         raise DataError('the covariance of the pose has a negative variance')
@@ -185,11 +177,7 @@ def position_sigma(message: Any) -> float | None:
 
 
 def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
-    """
-    Return the motion of a JointTrajectory, matched by name, t from its first point [s].
-
-    Velocities are kept where every point has them.
-    """
+    """Return the motion of a JointTrajectory; velocities where every point has them."""
     index = list(_indices(tuple(message.joint_names), tuple(joint_names)))
     count, points = len(message.joint_names), message.points
     if len(points) < 2:
@@ -221,15 +209,7 @@ def diagnostics(message: Any) -> dict[str, dict[str, str]]:
 
 
 def metrics(message: Any) -> Mapping[str, float]:
-    """
-    Return the numbers of the first status of a DiagnosticArray.
-
-    Raises
-    ------
-    DataError
-        The array is empty, or a value is not a number.
-
-    """
+    """Return the numbers of the first status of a DiagnosticArray."""
     for status in message.status:
         try:
             return {pair.key: float(pair.value) for pair in status.values}

@@ -28,11 +28,7 @@ class GoalPoints(NamedTuple):
 
 
 def read_goal(trajectory: Any, joint_names: Sequence[str]) -> GoalPoints:
-    """
-    Return the points of a JointTrajectory, in the order of the robot's joints.
-
-    Further joints, such as those of a track, are left as they are. One prefix is taken off.
-    """
+    """Return the points of a JointTrajectory in the robot's order, one prefix taken off."""
     names = list(trajectory.joint_names)
     columns = _columns(names, joint_names)
     points, count = trajectory.points, len(names)
@@ -76,13 +72,7 @@ def _values(points: Sequence[Any], kind: str, columns: tuple[int, ...]) -> Array
 
 
 def corrected_trajectory(trajectory: Any, columns: Sequence[int], goal: Goal, waits: float) -> Any:
-    """
-    Return a copy of a JointTrajectory with the robot's joints at other points.
-
-    columns: as `read_goal` returns them.
-    goal: as many points as the trajectory has.
-    waits: by how much all points are later [s].
-    """
+    """Return a copy of a JointTrajectory with its columns of the robot corrected, later by [s]."""
     out = deepcopy(trajectory)
     late = round(waits * NANOSECONDS)
     for k, point in enumerate(out.points):
@@ -103,12 +93,9 @@ def beyond_tolerance(
     tolerances: Sequence[Any], names: Sequence[str], columns: Sequence[int], moved: Array
 ) -> str:
     """
-    Return which joint a correction takes beyond what a goal tolerates; empty for none.
+    Return which joint a correction (N, n) takes beyond what a goal tolerates; empty for none.
 
-    tolerances: positions that are not positive tolerate what the controller does.
-    names: of the trajectory.
-    columns: as `read_goal` returns them.
-    moved: shape (N, n) [rad or m].
+    Positions that are not positive tolerate what the controller does.
     """
     most = dict(zip((names[c] for c in columns), np.abs(moved).max(axis=0), strict=True))
     for one in tolerances:

@@ -46,14 +46,9 @@ class Layout:
 
     def columns(self, block: np.ndarray) -> tuple[np.ndarray, list[Array]] | None:
         """
-        Return stamps [ns], shape (N,), and each run of doubles, shape (N, count).
+        Return stamps (N,) [ns] and runs of doubles (N, count) of messages (N, size).
 
-        block: messages, a row each, shape (N, size).
-
-        Returns
-        -------
         None where a message is of another layout.
-
         """
         for at, fixed in self.same:
             if (block[:, at : at + len(fixed)] != np.frombuffer(fixed, np.uint8)).any():
@@ -68,18 +63,7 @@ class Layout:
         return ns, runs
 
     def filled(self, data: bytes, ns: np.ndarray, runs: Sequence[Array]) -> np.ndarray:
-        """
-        Return messages like one of this layout, with other stamps and numbers.
-
-        data: the message to repeat.
-        ns: shape (N,) [ns].
-        runs: one for each run of doubles.
-
-        Returns
-        -------
-        array of uint8, shape (N, size)
-
-        """
+        """Return messages (N, size) like one of this layout, with other stamps [ns] and runs."""
         out = np.tile(np.frombuffer(data, np.uint8), (ns.size, 1))
         seconds, rest = np.divmod(ns, NANOSECONDS)
         out[:, _STAMP] = np.column_stack([seconds, rest]).astype('<u4').view(np.uint8)
@@ -123,12 +107,7 @@ class _Walk:
 
 
 def layout_of(kind: str, data: bytes) -> Layout | None:
-    """
-    Return the layout of a message that can be decoded; None for types and senders without one.
-
-    data: the message; one run of doubles follows its header, or, of a joint state, positions,
-    velocities and efforts.
-    """
+    """Return the layout of a message that can be decoded; None where it has none."""
     if data[:2] != _LITTLE_ENDIAN or (kind != JOINT_STATE and kind not in NUMBERS):
         return None
     walk = _Walk(data)

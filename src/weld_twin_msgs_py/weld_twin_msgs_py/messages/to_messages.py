@@ -97,10 +97,7 @@ class Messages:
         """
         Return a PoseWithCovarianceStamped.
 
-        position: shape (3,) [m].
-        rotation: shape (3, 3).
-        covariance: position first [m^2], then turns about the fixed axes of the frame [rad^2],
-        shape (6, 6).
+        covariance: position first [m^2], then turns about the fixed axes of the frame [rad^2].
         """
         inner = self._make(
             'geometry_msgs/msg/PoseWithCovariance',
@@ -304,15 +301,9 @@ class Lines(NamedTuple):
 
 def quaternion(rotation: Array) -> list[float]:
     """
-    Return the quaternion x y z w, w >= 0, of one rotation (3, 3).
+    Return the quaternion x y z w, w >= 0, of one rotation (3, 3), as Shepperd does (1978).
 
-    In plain numbers, because a live node makes one per sample and scipy takes a third of a
-    millisecond for it.
-
-    References
-    ----------
-    .. [1] S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1, 1978.
-
+    In plain numbers: a live node makes one per sample, and scipy takes a third of a millisecond.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
     trace = xx + yy + zz

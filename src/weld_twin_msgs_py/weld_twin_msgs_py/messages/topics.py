@@ -96,15 +96,7 @@ class Topic:
 
 
 def message_class(kind: str) -> Any:
-    """
-    Return the rclpy class of a message type.
-
-    Raises
-    ------
-    ImportError
-        The package is not installed here, or has no such message.
-
-    """
+    """Return the rclpy class of a message type."""
     package, space, name = kind.split('/')
     try:
         return getattr(import_module(f'{package}.{space}'), name)

@@ -42,11 +42,9 @@ class _Block:
 
 class Blocks:
     """
-    Follows frames through branches and loops.
+    Follows frames through branches and loops; calls ``unclear`` with the field of a move.
 
     A frame that not every way sets alike is unclear after them, and in a loop until it is set.
-
-    unclear: by the field of a move that holds a frame, in the order in which they are handed over.
     """
 
     def __init__(self, program: Program, **unclear: Unclear) -> None:

@@ -45,11 +45,7 @@ class Point(NamedTuple):
 
 
 class Ref(NamedTuple):
-    """
-    A place that a move leads to, ``before @ point @ after`` in the base frame.
-
-    ``leads`` is False where the place is derived from the point, such as an approach above it.
-    """
+    """A place that a move leads to, or is derived from: ``before @ point @ after``."""
 
     point: int
     before: Array | None = None
@@ -108,12 +104,7 @@ class Program:
         file: int = 0,
         external: Array | None = None,
     ) -> int:
-        """
-        Add a point and return its index.
-
-        file: which of the sources they stand in.
-        external: positions of external axes at a pose, shape (m,).
-        """
+        """Add a point of one of the sources, with external axes at a pose; return its index."""
         where = self.sources[file].where(numbers[0].start)
         try:
             value = notation.value([number.value for number in numbers])
@@ -165,11 +156,8 @@ def hold_if_used_elsewhere(
     """
     Hold the points whose names stand where they are not understood.
 
-    A point that is assigned, computed with or handed on may come to mean something else.
-
-    names: points by name, in lower case where the language does not care.
-    texts: the files, comments and strings blanked out.
-    used: for every file, the places of names that are understood.
+    A point that is assigned, computed with or handed on may come to mean something else. Places of
+    names that are understood are given for every file; comments and strings are blanked out.
     """
     for file, text in enumerate(texts):
         for result in re.finditer(r'[A-Za-z_$][\w$]*', text):
@@ -184,8 +172,6 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
     Return the points and moves of a program on a robot.
 
     Moves from one joint move to the next make a seam, together with the point it begins at.
-
-    controller: where the controller's frames are on this robot, and the frames that were given.
     """
     count = len(controller.external)
     controller.name_tools(step.tool for step in program.steps)
@@ -268,11 +254,7 @@ QUADRANT_DOUBT = np.radians(0.5)
 
 
 def turn_bits(turn: int) -> Suits:
-    """
-    Return what takes the postures whose axes have the signs of T.
-
-    turn: bit k is set where axis k + 1 is below zero.
-    """
+    """Return what takes postures whose axes have the signs of T: bit k is axis k + 1 below 0."""
 
     def suits(controller: Controller) -> Any:
         def of(q: Array) -> Array:
@@ -317,7 +299,7 @@ def flags_kept(kind: Kind, point: Point, flags: Sequence[Flag]) -> Astray | None
     """
     Return what tells the axes that pass where flags change; of joint moves to poses alone.
 
-    flags: of the controller. One too many leaves a point as it was, one too few turns an arm round.
+    One flag too many leaves a point as it was, one too few turns an arm round.
     """
     if kind != 'joint' or point.notation.joints:
         return None
@@ -349,7 +331,7 @@ def quadrants(conf: Sequence[int]) -> Suits:
     """
     Return what takes the postures whose axes 1, 4 and 6 are in the quadrants of a confdata.
 
-    conf: cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
+    Its cfx is left out: what that means depends on the arm.
     """
 
     def suits(controller: Controller) -> Any:
@@ -370,11 +352,7 @@ def quadrants(conf: Sequence[int]) -> Suits:
 
 
 def nearest(near: Array) -> Suits:
-    """
-    Return what takes the posture nearest given joint positions, as qnear does.
-
-    near: shape (n,).
-    """
+    """Return what takes the posture nearest given joint positions, as qnear does."""
 
     def of(q: Array) -> Array:
         away = np.abs(q - near).sum(axis=1)

@@ -34,11 +34,7 @@ class Context(NamedTuple):
         return self.robot.n - len(self.controller.external)
 
     def external(self, numbers: Sequence[Number | None]) -> Array | None:
-        """
-        Return the external axes of a point as joints of the model; None where one is missing.
-
-        numbers: degrees or mm, in the order of ``controller.external``.
-        """
+        """Return external axes [deg, mm] as joints of the model; None where one is missing."""
         values = [number.value for number in numbers if number is not None]
         if len(values) < len(numbers):
             return None
@@ -57,11 +53,9 @@ class Context(NamedTuple):
 
     def shown(self, unit: Array, decimals: int, name: str) -> Notation:
         """
-        Return joint positions as the controller shows them.
+        Return joint positions as the controller shows them, in units of the model's, shape (n,).
 
         They can be neither read nor written where it is known to count otherwise.
-
-        unit: model units of one that is written, shape (n,) [rad or m].
         """
         out = joint_notation(unit, self.controller.mix, decimals, name)
         return out._replace(value=self._refuse, numbers=self._refuse) if self.otherwise() else out

@@ -60,11 +60,7 @@ def carrying(robot: Robot) -> int:
 
 
 def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis, ...]:
-    """
-    Return the external axes of a robot in the order of its joints.
-
-    given: which is which, as ``E1=rail,E2=-tilt``; empty where it is not given.
-    """
+    """Return external axes in the order of the joints, given as ``E1=rail,E2=-tilt``."""
     names = robot.joint_names[: carrying(robot)]
     listed = ', '.join(names)
     if language not in LABELS:
@@ -264,12 +260,9 @@ def controller_of(
     cell: Cell | None = None,
 ) -> Controller:
     """
-    Return the frames of the controller that runs a language on a robot.
+    Return the frames of the controller that runs a language, with those that were given.
 
-    language: each maker's controller runs its own, on its own robots; on others nothing is
-    assumed.
-    tools, bases: frames that were given, shape (4, 4) [m].
-    cell: what was given about external axes.
+    Each maker's controller runs its own, on its own robots; on others nothing is assumed.
     """
     given = cell or Cell()
     axes = external_axes(given.external, robot, language)
@@ -299,15 +292,9 @@ def controller_of(
 
 def world_of(robot: Robot, language: str) -> tuple[Array, str]:
     """
-    Return the world of a controller as delivered: the arm's own base, or where its track begins.
+    Return the world of a controller as delivered, in the frame where the robot's own rows begin.
 
-    Returns
-    -------
-    array, shape (4, 4) [m]
-        In the frame where the robot's own rows begin.
-    str
-        What it is taken to be.
-
+    It is the arm's own base, or where its track begins, as the second value says.
     """
     count = carrying(robot)
     if count > robot.behind:

@@ -87,12 +87,7 @@ LANGUAGES: dict[str, Language] = {
 
 
 def language_of(source: Source, path: Path | str, controller: str = '') -> str:
-    """
-    Return the name of a program's language.
-
-    path: where it was read.
-    controller: as the user named it; empty to let the file tell.
-    """
+    """Return the name of a program's language, as the user named it, or as the file tells."""
     known = ', '.join(LANGUAGES)
     if controller:
         if controller not in LANGUAGES:
@@ -112,11 +107,7 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
 
 
 def read_program(path: Path | str, context: Context, controller: str = '') -> Program:
-    """
-    Return a program with the files that belong to it.
-
-    controller: its language; empty to let the file tell.
-    """
+    """Return a program with the files that belong to it; its language as of `language_of`."""
     source = read_source(path)
     name = language_of(source, path, controller)
     _refuse_cut(source, LANGUAGES[name])

@@ -79,12 +79,7 @@ class Reader(ABC):
     def calls(
         self, routines: Sequence[tuple[str, Span]], does: Callable[[str], object], call: str
     ) -> list[re.Match[str]]:
-        """
-        Return the calls of routines of this file that do something, or call one that does.
-
-        routines: their names, and where their statements stand. does: takes their text. call: a
-        pattern of calls, with {} for names.
-        """
+        """Return calls, a pattern with {}, of routines that do something or call one that does."""
         names = {name.lower() for name, span in routines if does(self.text[slice(*span)])}
         while names:
             listed = '|'.join(map(re.escape, sorted(names)))
@@ -171,8 +166,6 @@ class Reader(ABC):
         Give moves that stand before any frame of their routine the one that the program sets.
 
         Where it sets several, nobody knows which holds when the routine is called.
-
-        name: of the field of a move. inherited: what stands in these moves. own: what the program sets.
         """
         values = {(f.name, f.why, None if f.value is None else f.value.tobytes()) for f in own}
         if len(values) > 1:

@@ -23,12 +23,7 @@ UNMOVED = 1e-9
 
 
 def rewritten(program: Program, points: Sequence[Array], moved: Collection[int]) -> list[str]:
-    """
-    Return the texts of the files with some points moved.
-
-    points: values of all points.
-    moved: those whose numbers are written anew.
-    """
+    """Return the texts of the files with some points moved to the values of all points."""
     edits: list[tuple[int, int, int, str]] = []
     for k in sorted(moved):
         point = program.points[k]
@@ -51,12 +46,7 @@ def rewritten(program: Program, points: Sequence[Array], moved: Collection[int])
 
 
 def numeral(value: float, old: str, least: int) -> str:
-    """
-    Return a number as text, with as many digits after the point as the old one has.
-
-    old: the number that it replaces; a sign before a positive one is kept.
-    least: digits after the point at least; 0 writes whole numbers.
-    """
+    """Return a number as text, with the digits and the written sign of the old one."""
     text = f'{value:.{max(least, _decimals(old)) if least else 0}f}'
     if re.fullmatch(r'-0(\.0*)?', text):
         text = text[1:]
@@ -69,12 +59,7 @@ def _decimals(text: str) -> int:
 
 
 def check_written(before: Program, after: Program, points: Sequence[Array]) -> None:
-    """
-    Refuse a program that does not say what it was to say when it is read again.
-
-    before, after: as it was, and the new text read again.
-    points: what the new text is to say.
-    """
+    """Refuse a program that does not say what it was to say when it is read again."""
     same = len(before.points) == len(after.points) and len(before.steps) == len(after.steps)
     if same:
         for one, other in zip(before.steps, after.steps, strict=True):

@@ -65,11 +65,7 @@ def fixed_angles(rx: float, ry: float, rz: float) -> Array:
 
 
 def angles_fixed(rotation: Array, near: Sequence[float]) -> list[float]:
-    """
-    Return the angles about the fixed x, y and z of a rotation that are nearest given ones [rad].
-
-    rotation: shape (3, 3).
-    """
+    """Return the angles about the fixed x, y and z that are nearest given ones [rad]."""
     cosine = float(np.hypot(rotation[0, 0], rotation[1, 0]))
     pitch = float(np.arctan2(-rotation[2, 0], cosine))
     if cosine < GIMBAL:
@@ -149,11 +145,9 @@ UR_POSE = Notation('x y z rx ry rz', False, _rotvec_value, _rotvec_numbers, (7, 
 
 def joint_notation(per_unit: Array, mix: Array, decimals: int, name: str) -> Notation:
     """
-    Return a notation of joint positions.
+    Return a notation of joint positions, each in units of the model's [rad or m], shape (n,).
 
-    per_unit: model units [rad or m] of one unit as written, shape (n,).
-    mix: makes the joints of the model from those of the controller, where they are coupled, shape
-    (n, n).
+    mix: from joints of the controller to those of the model where they are coupled, (n, n).
     """
     back = np.linalg.inv(mix)
 
@@ -230,13 +224,7 @@ def read_source(path: Path | str) -> Source:
 
 
 def number_at(source: Source, start: int, end: int, what: str, file: int = 0) -> Number:
-    """
-    Return the number that a piece of text is.
-
-    start, end: the piece.
-    what: what the number is, for the message.
-    file: which of the program's files.
-    """
+    """Return the number that a piece of a file is; ``what`` it is, a message says."""
     piece = source.text[start:end]
     match = _ALONE.match(piece)
     if match is None:
@@ -286,11 +274,7 @@ def stripped(text: str, start: int, end: int) -> tuple[int, int]:
 
 
 def masked(text: str, patterns: Sequence[str]) -> str:
-    """
-    Return a text of the same length with comments and strings blanked out, line ends kept.
-
-    So is the mark (BOM) that Windows sets before UTF-8.
-    """
+    """Return a text with comments, strings and the mark of Windows blanked out."""
     either = re.compile('|'.join(f'(?:{pattern})' for pattern in (r'\A\xef\xbb\xbf', *patterns)))
     return either.sub(lambda result: re.sub(r'[^\r\n]', ' ', result[0]), text)
 

@@ -70,12 +70,7 @@ class Exported:
         return self.context.controller.external
 
     def labelled(self, move: ExportMove, own: str) -> dict[str, float]:
-        """
-        Return the joints of a move as shown, by what the controller calls them.
-
-        own: a form with a number, of the arm's joints; external axes follow in the order of their
-        names.
-        """
+        """Return the joints of a move as shown, called ``own`` with a number, then external axes."""
         names = [own.format(k + 1) for k in range(self.context.axes)]
         labels = [*names, *(axis.label for axis in self.external)]
         shown = list(zip(labels, self.joints(move), strict=True))
@@ -134,13 +129,7 @@ LOADING: dict[str, tuple[str, str, str]] = {
 
 
 def sheet(program: Exported, language: str, file: str, speeds: str, notes: Sequence[str]) -> str:
-    """
-    Return the sheet as Markdown.
-
-    file: name of the program's file.
-    speeds: how fast it runs, in one sentence.
-    notes: what to look out for, in sentences.
-    """
+    """Return the sheet as Markdown."""
     load, record, output = (text.format(trigger=program.trigger) for text in LOADING[language])
     when = 'while the arm stands' if program.stations else 'from the first to the last move'
     minutes = sum(m.duration + m.dwell for m in program.moves) / 60.0

@@ -58,19 +58,9 @@ class Row(NamedTuple):
 
 def dh_rows(axes: list[Axis], T_base_tip: Array) -> tuple[Array, list[Row], list[Array]]:
     """
-    Return the rows that have the given axes.
+    Return the first frame, the rows of a chain of axes, and the frame at the end of each.
 
-    axes: in chain order.
-    T_base_tip: at joint position zero, shape (4, 4).
-
-    Returns
-    -------
-    T_base_first : array, shape (4, 4)
-        The frame of the first axis.
-    rows : list of Row
-    frames : list of array, shape (4, 4)
-        The frame at the end of each row, in the base, at joint position zero.
-
+    All are in the base, at joint position zero, where the tip is ``T_base_tip``.
     """
     first = _first_frame(axes[0])
     frame, rows, frames = first, [], []

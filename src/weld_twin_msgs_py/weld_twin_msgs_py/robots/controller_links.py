@@ -60,9 +60,7 @@ def foot_of(
     """
     Return the link that the arm stands in and the controller's base, placed in the first link.
 
-    base: the first link of the chain.
-    chain: from base to tip.
-    wanted: the link that was asked for with --base-link; it is both.
+    The link that was asked for with --base-link is both.
     """
     if wanted is not None:
         return FixedLink(base, np.eye(4), 0), FixedLink(base, np.eye(4), 0)
@@ -81,12 +79,7 @@ def foot_of(
 def flange_link_of(
     tree: Tree, chain: Sequence[Joint], tip: str, wanted: str | None
 ) -> tuple[str, Array]:
-    """
-    Return the link of the controller's flange, and where it is in the tip link.
-
-    chain: from base to tip.
-    wanted: the link that was asked for.
-    """
+    """Return the link of the controller's flange, and where it is in the tip link."""
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     last = moving[-1].child
     fixed = _fixed_to(tree, last, down_only=True)
@@ -120,12 +113,7 @@ def _likeliest(fixed: dict[str, FixedLink], way: list[str]) -> str:
 
 
 def _rank(link: str, fixed: bool, carries: bool) -> int:
-    """
-    Return how surely a link is the flange, 0 most.
-
-    fixed: it hangs on the last link that moves, and is not that.
-    carries: the tip hangs on it.
-    """
+    """Return how surely a link is the flange, 0 most."""
     name = link.lower()
     words = f'_{name}'
     if words.endswith(f'_{FLANGE}'):

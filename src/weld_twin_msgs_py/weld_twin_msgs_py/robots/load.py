@@ -56,11 +56,7 @@ def robot_names() -> tuple[str, ...]:
 
 
 def _own_robot(spec: str) -> Path | None:
-    """
-    Return the file of a robot of one's own, None where the name is none of theirs.
-
-    spec: a name without a suffix, in capital or small letters.
-    """
+    """Return the file of a robot of one's own, in any letters; None for other names."""
     result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
     if result and spec.lower() in catalog.names():
         result.insert(0, 'the bundled one')

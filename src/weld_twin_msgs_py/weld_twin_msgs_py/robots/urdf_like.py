@@ -38,11 +38,7 @@ class GivenUrdf(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """
-    Frames in the base at joint position zero, (4, 4) each.
-
-    Of the last joint, of the tip, and of the tip with the tool as it was given.
-    """
+    """Frames of the last joint, the tip, and the tip with its given tool, in the base."""
 
     carrier: Array
     plain: Array
@@ -63,11 +59,7 @@ def write_urdf_like(
     The origin of every moving joint is set so that its axis and the links behind it are where the
     robot has them; the origin of the last fixed joint before the tip holds the tool. Where the tip
     is the controller's flange, or carries it, a link ``controller_flange`` keeps the flange where
-    it is, and a fixed joint more holds the tool.
-
-    robot: the corrected one, with the joints of the given file; where its base stands in the world
-    is not written.
-    notes: comments at the top.
+    it is, and a fixed joint more holds the tool. Where its base stands is not written.
     """
     chain = chain_of(*given[:3])
     nominal, arm = read_urdf(*given), robot

@@ -95,11 +95,7 @@ class Chain(NamedTuple):
 
 
 def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | None = None) -> Chain:
-    """
-    Return the joints from base to tip.
-
-    path, base_link, tip_link: as for `read_urdf`.
-    """
+    """Return the joints from base to tip."""
     tree = read_tree(path)
     base = _base(tree, base_link)
     return _chain(tree, base, _tip(tree, base, tip_link))

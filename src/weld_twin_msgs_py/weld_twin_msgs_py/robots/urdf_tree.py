@@ -49,11 +49,7 @@ class Link(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """
-    One joint: where its frame sits in its parent link, and how it moves.
-
-    Lower, upper and velocity limits are infinite where the URDF gives none.
-    """
+    """One joint: where its frame sits in its parent link, and how it moves."""
 
     name: str
     kind: str

@@ -101,7 +101,6 @@ def read_cells(
     """
     Read a delimited text file with a header line, or a log or export in a form that is known.
 
-    delimiter, decimal: left out, they are found.
     marker: what is meant, where an export holds several things that were tracked.
     """
     path = Path(path)

@@ -142,8 +142,7 @@ def _once(cells: Cells, names: list[str], said: list[str]) -> Cells:
     """
     Return the table with one row of every posture.
 
-    Logs that have a row for everything that was noted at a posture repeat the joints to the last
-    digit; two touches never do.
+    Logs with a row for everything noted repeat joints to the last digit; touches never do.
     """
     _, first = cells.alike(names)
     more = len(cells.rows) - len(first)
@@ -161,11 +160,7 @@ def _touched(contacts: Contacts, known: Artefact) -> list[str]:
 
 
 def _columns(cells: Cells, alone: str | None) -> dict[str, str]:
-    """
-    Return the columns by use.
-
-    Where all that can be touched is one thing, ``alone``, no column has to name it.
-    """
+    """Return the columns by use; what all touches have in common is ``alone``."""
     out = cells.by_words(WORDS)
     if 'contact' not in out and alone is None:
         raise DataError(

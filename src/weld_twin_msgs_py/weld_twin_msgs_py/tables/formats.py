@@ -126,11 +126,7 @@ _UNITS = {'meters': 'm', 'millimeters': 'mm', 'centimeters': 'cm', 'm': 'm', 'mm
 
 
 def headed(known: Format, text: str, marker: str | None) -> Read:
-    """
-    Return the columns of a known format that mean something here.
-
-    marker: marker or body that is meant, where the file has several.
-    """
+    """Return the columns of a known format that mean something here, of one marker or body."""
     lines = text.splitlines()
     at = next((k for k, line in enumerate(lines) if re.search(known.header, line)), -1)
     if at < 0:

@@ -143,11 +143,7 @@ def _axis(word: str, words: Sequence[str]) -> tuple[str, str]:
 
 
 def _joints(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
-    """
-    Return columns with the joints' own names; joints without one are numbered.
-
-    What slides may be an axis beside the arm: E1 of KUKA, eax_a of ABB.
-    """
+    """Return columns with the joints' own names; others are numbered, slides perhaps as E1."""
     own = _by_own_names(parts, robot)
     missing = [joint for joint in robot.joint_names if joint not in own]
     remaining = [part for part in parts if part.name not in own.values()]
@@ -310,10 +306,9 @@ def _one_group(
     parts: Sequence[Named], kind: str, words: set[str], option: str, bare: bool, axes: str = 'xyz'
 ) -> tuple[str, ...]:
     """
-    Return the one complete group of a kind whose stem says so.
+    Return the one complete group of a kind whose stem says so, or, with ``bare``, that has none.
 
-    With ``bare``, a group without any stem will do when no other says so. Spread words (sigma,
-    difference) never count as measured.
+    Spread words (sigma, difference) never count as measured.
     """
     groups: dict[tuple[str, ...], dict[str, str]] = {}
     twice: dict[tuple[str, ...], list[str]] = {}

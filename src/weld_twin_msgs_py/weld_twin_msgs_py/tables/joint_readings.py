@@ -67,9 +67,7 @@ def joint_angles(
     """
     Return the joint columns of a table, shape (M, n) [rad or m], and say how they were read.
 
-    names: the columns, in the robot's order.
-    said: sentences are added to it.
-    units: of columns that name none; left out, the size of the numbers decides.
+    Where neither names nor ``units`` tell it, the size of the numbers does.
     """
     q = cells.stack(names)
     if units is None:
@@ -89,12 +87,7 @@ def joint_units(
     said: list[str],
     judge: Judge | None = None,
 ) -> Units:
-    """
-    Return the units of the columns without one of their own.
-
-    q: as the table has it, shape (M, n).
-    robot, names, options, said, judge: as for `joint_angles`.
-    """
+    """Return the units of the columns without one of their own."""
     turning, sliding = ~robot.prismatic, robot.prismatic
     units = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
     usual = Units(units[0] or _usual_angle(q[:, turning]), units[1] or _usual_slide(q, robot))
@@ -198,8 +191,7 @@ def as_modelled(q: Array, robot: Robot, options: TableOptions, said: list[str]) 
     """
     Return joint columns, shape (M, n) [rad or m], counted as the model counts them.
 
-    Signs come first, then what one joint adds to another, then offsets, which are in the
-    model's sense.
+    Signs come first, then what one joint adds to another, then offsets in the model's sense.
     """
     for name in ('joint_signs', 'joint_offsets'):
         given = getattr(options, name)

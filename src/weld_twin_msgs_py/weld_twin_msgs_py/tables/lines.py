@@ -37,11 +37,7 @@ _WITH_UNIT = re.compile(r'^([-+\u2212]?[\d.,]*\d(?:[eE][-+]?\d+)?)\s*([^\d\s.,+-
 
 
 def number(text: str, decimal: str) -> float:
-    """
-    Return a cell as a number.
-
-    decimal: '.' or ','.
-    """
+    """Return a cell as a number."""
     plain = _GAP.sub('', text).replace('\N{MINUS SIGN}', '-')
     if _GROUPED[decimal].match(plain):
         plain = plain.replace('.' if decimal == ',' else ',', '')
@@ -53,12 +49,7 @@ def number(text: str, decimal: str) -> float:
 
 
 def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -> str:
-    """
-    Return the decimal sign of the numbers in some rows.
-
-    path: for the message.
-    delimiter: between the cells; a comma there is no decimal sign.
-    """
+    """Return the decimal sign of the numbers in rows; a comma that delimits cells is none."""
     if delimiter == ',':
         return '.'
     plain, either, grouped = set[str](), set[str](), set[str]()
@@ -83,12 +74,7 @@ def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -
 def without_units(
     path: Path, header: list[str], rows: list[list[str]], unit_of_name: dict[str, str | None]
 ) -> tuple[list[str], list[list[str]]]:
-    """
-    Return a table with units that stand behind every number of a column taken into its header.
-
-    path: for the message.
-    unit_of_name: units that the header gives already.
-    """
+    """Return a table with units behind every number of a column taken into its header."""
     first = rows[0] if rows else []
     marked = [k for k, cell in enumerate(first) if _WITH_UNIT.match(cell)]
     for k in marked:
@@ -128,13 +114,7 @@ class Lines(NamedTuple):
 
 
 def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -> Lines:
-    """
-    Return the header and the rows of a text, and say how they were found.
-
-    path: for messages.
-    delimiter: left out, it is found.
-    said: sentences are added to it.
-    """
+    """Return the header and the rows of a text, and say in ``said`` how they were found."""
     lines = _without_comments(re.split(r'\r\n|\r|\n', text))
     if sum(1 for line in lines if line.strip()) < 2:
         raise DataError(f"table '{path}' needs a header line and at least one row")

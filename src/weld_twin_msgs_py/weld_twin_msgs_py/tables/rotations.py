@@ -29,12 +29,7 @@ ROUNDING = 1e-4
 
 
 def rotations(angles: Array, convention: str) -> Array:
-    """
-    Return rotation matrices, shape (M, 3, 3).
-
-    angles: about x, y, z, in that order of columns, shape (M, 3) [rad].
-    convention: 'XYZ' means Rx Ry Rz and so on; or 'rotvec'.
-    """
+    """Return rotations (M, 3, 3) of angles (M, 3) [rad]: 'XYZ' means Rx Ry Rz; or 'rotvec'."""
     if convention == ROTATION_VECTOR:
         return np.asarray(Rotation.from_rotvec(angles).as_matrix())
     columns = angles[:, ['XYZ'.index(axis) for axis in convention]]

@@ -35,13 +35,7 @@ def largest(values: Array) -> float:
 
 
 def factor(known: Mapping[str, float], unit: str, column: str, what: str) -> float:
-    """
-    Return what a column is multiplied with.
-
-    known: units that fit, and what they are in SI.
-    unit: that the header or the user gives.
-    column, what: for people: the column, and what it is taken for.
-    """
+    """Return what a column is multiplied with; what is known of its kind has units, in SI."""
     if unit not in known:
         raise DataError(
             f'column {column!r} is taken for {what}, and its unit {unit!r} does not fit; name '
@@ -107,9 +101,7 @@ def stamps(
     """
     Return stamps of the rows, shape (rows,) [s], and a sentence; None when they are no use.
 
-    ``date`` is the column of the day, where the time of day has a column of its own. Stamps that
-    are missing, rounded until they repeat, or not increasing say nothing that the order of the
-    rows does not.
+    ``date`` is the column of the day, where the time of day has a column of its own.
     """
     order = 'rows are taken in their order, one station per second'
     if column is None:
@@ -127,11 +119,7 @@ def stamps(
 def later_rows(
     cells: Cells, column: str | None, date: str | None = None
 ) -> NDArray[np.intp] | None:
-    """
-    Return the rows whose stamp is later than all before; None where the stamps are no use.
-
-    A stream whose stamps are rounded repeats some of them, and says no less for it.
-    """
+    """Return the rows whose stamp is later than all before; None where the stamps are no use."""
     values = None if column is None else _parsed(cells, column, date)
     if values is None or np.isnan(values).any():
         return None
@@ -196,12 +184,9 @@ _CORNERS = tuple(
 
 def misfit(robot: Robot, q: Array, position: Array) -> Array:
     """
-    Return the distance of each position from the nominal arm, shape (M,) [m].
+    Return the distance of each position (M, 3) from the nominal arm, shape (M,) [m].
 
     Measuring frame and tool point are fitted, in turns: a rigid fit (Kabsch), then a linear one.
-
-    q: shape (M, n).
-    position: shape (M, 3) [m].
     """
     T = forward(robot, q)
     flange, turn = T[:, :3, 3], T[:, :3, :3]

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Traces of KUKA: a text, ``.dat``, in the form of DIAdem, and files of values beside it.
-
-It describes channels, and the files beside it hold their values.
-"""
+"""Traces of KUKA: a text, ``.dat``, in the form of DIAdem, and files of values beside it."""
 
 from __future__ import annotations
 

@@ -41,11 +41,7 @@ def is_point_list(text: str) -> bool:
 
 
 def read_point_list(path: Path, text: str, marker: str | None) -> Read:
-    """
-    Return the points of a list; of nominal and measured points the measured ones.
-
-    marker: the group of points that is meant.
-    """
+    """Return the points of a list; of nominal and measured points the measured ones."""
     rows = _rows(text)
     layout = _layout(rows[:_LOOK])
     assert layout is not None

@@ -38,8 +38,7 @@ class Given(argparse.Namespace):
     """
     The options of a command as attributes, and what groups of them stand for.
 
-    A method needs the options of one table of `options`, and raises a DataError or a ModelError that
-    says which of them cannot be meant so.
+    A method needs the options of one table of `options`; an error says which cannot be meant so.
     """
 
     def refuse(self, names: Iterable[str], why: str) -> None:
@@ -114,11 +113,7 @@ class Given(argparse.Namespace):
     def write_results(
         self, mark: str, page: str, entry: dict[str, Any], files: Iterable[tuple[str, bytes]] = ()
     ) -> None:
-        """
-        Write a page and the result that it shows to the folder of results.
-
-        ``mark``: name of the result. ``page``: left out where it is empty. ``files``: more of them.
-        """
+        """Write a page, if there is one, the result it shows, and more files, to the folder."""
         from weld_twin_msgs_py.files.whole_files import write_json, write_text
 
         with self.output(mark) as place:
@@ -163,11 +158,7 @@ class Given(argparse.Namespace):
             raise DataError('--trigger must be the number of an output')
 
     def program_context(self, robot: Robot, language: str, model: str | None = None) -> Context:
-        """
-        Return the robot and frames of a program; its language says how these are written.
-
-        ``model``: what tells how the controller counts joints.
-        """
+        """Return the robot and frames of a program; a model may tell how the controller counts."""
         import numpy as np
 
         from weld_twin_msgs_py.files.diagnosis_model import counted_of
@@ -195,11 +186,7 @@ class Given(argparse.Namespace):
         return Context(robot, controller_of(robot, language, tools, bases, cell), pulses, counted)
 
     def read_start(self, context: Context) -> Array | None:
-        """
-        Return the joint positions of --start, shape (n,) [rad or m].
-
-        They are given as the controller shows them; beside external axes as the robot file has them.
-        """
+        """Return --start, shape (n,) [rad or m], as the controller shows it if the arm is alone."""
         import numpy as np
 
         robot = context.robot
@@ -299,12 +286,7 @@ def _numbers(text: str, option: str) -> list[float]:
 
 
 def quantity(text: str, units: Sequence[str], option: str) -> float:
-    """
-    Return a size with its unit, such as ``2mm`` or ``0.5deg``, in SI.
-
-    Of ``units`` the first is meant where none is written. A DataError names the ``option`` where the
-    text is no size in one of them.
-    """
+    """Return a size, such as ``2mm`` or ``0.5deg``, in SI; without a unit in the first of them."""
     result = re.fullmatch(r'\s*(\d+\.?\d*|\.\d+)(e[-+]?\d+)?\s*([a-z]*)\s*', text, re.I)
     unit = result[3] or units[0] if result else ''
     value = float(result[1] + (result[2] or '')) if result else -1.0

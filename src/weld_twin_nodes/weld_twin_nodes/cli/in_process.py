@@ -20,11 +20,7 @@ class Said(NamedTuple):
 
 
 def weld_twin(*words: object) -> Said:
-    """
-    Run ``weld-twin`` with the words given, in this process, and return what it said.
-
-    ``words``: the command's words; paths and numbers are written out.
-    """
+    """Run ``weld-twin`` with the words given, in this process, and return what it said."""
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         try:

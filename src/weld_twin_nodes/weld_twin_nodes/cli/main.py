@@ -125,11 +125,7 @@ def _say_new_name(words: Sequence[str]) -> None:
 
 
 def parser_of(words: Sequence[str] = ()) -> Parser:
-    """
-    Return the parser; only the command in use is loaded with its options.
-
-    ``words``: as they were typed, old spellings included.
-    """
+    """Return the parser, the options loaded of the command in use alone, for words as typed."""
     parser = Parser(
         prog='weld-twin',
         description="Digital twin of a welding robot's positional accuracy.",

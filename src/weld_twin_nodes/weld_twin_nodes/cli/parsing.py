@@ -183,15 +183,7 @@ def _value(values: Sequence[str], *, again: bool) -> dict[str, Any]:
 
 
 class Parser(argparse.ArgumentParser):
-    """
-    A parser with a short help, a long one and an example.
-
-    Attributes
-    ----------
-    example : str
-        A whole command line; empty where there is none.
-
-    """
+    """A parser with a short help, a long one and, where there is one, an example."""
 
     def __init__(self, **more: Any) -> None:
         super().__init__(**more | {'add_help': False})

@@ -29,21 +29,9 @@ class Controller(Node):
     """
     Offers ``~/follow_joint_trajectory``, and runs one goal at a time; a new one takes its place.
 
-    q: where the arm stands, shape (n,).
     pace: how many times as fast as the goals say it runs them.
     beside: times [s] of a goal that it visits beside those of its beat.
-
-    Attributes
-    ----------
-    goals : list
-        Those it was given, in their order.
-    track : list of (int, float)
-        Stamps [ns] of the joint states on the way of the latest goal, and its time there [s].
-    accepts : bool
-        Whether it takes goals.
-    answers : float [s]
-        How long it thinks about one.
-
+    `track`: stamps [ns] of joint states on the way of the latest goal, and its time there [s].
     """
 
     def __init__(

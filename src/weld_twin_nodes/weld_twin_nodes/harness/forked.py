@@ -19,13 +19,7 @@ CONTEXT = multiprocessing.get_context('forkserver')
 
 
 class Forked:
-    """
-    A running node, with what the harness asks of `subprocess.Popen`.
-
-    module: that of the node.
-    words: what the program is given.
-    log: takes what it writes.
-    """
+    """A running node, a fork, with what the harness asks of `subprocess.Popen`."""
 
     def __init__(self, module: str, words: Sequence[str], log: Path) -> None:
         CONTEXT.set_forkserver_preload(list(MODULES.values()))
@@ -41,11 +35,7 @@ class Forked:
         return self._process.exitcode
 
     def wait(self, timeout: float | None = None) -> int:
-        """
-        Wait for the end [s]; return the exit code.
-
-        Raises subprocess.TimeoutExpired: it runs on.
-        """
+        """Wait for the end [s]; return the exit code, or raise subprocess.TimeoutExpired."""
         self._process.join(timeout)
         code = self.poll()
         if code is None:

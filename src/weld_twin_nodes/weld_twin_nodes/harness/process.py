@@ -43,8 +43,6 @@ def own_domain() -> Iterator[int]:
     A port of the domain is the lock, so that it holds for all users, whatever their folder for
     temporary files is, and is given back however the process ends. The environment names the
     domain meanwhile, and keeps discovery on this machine.
-
-    Raises TwinError: all of them are taken.
     """
     # Start somewhere else in every process: the domain is also somebody's who holds no lock.
     start = os.getpid() % len(DOMAINS)
@@ -64,11 +62,7 @@ def own_domain() -> Iterator[int]:
 
 
 def _port(number: int) -> socket.socket:
-    """
-    Return a port that is bound.
-
-    Raises OSError: somebody has it.
-    """
+    """Return a port that is bound; raise OSError where somebody has it."""
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         out.bind(('', number))
@@ -173,8 +167,7 @@ def stop_all(processes: Sequence[NodeProcess], grace: float = GRACE) -> None:
     Interrupt processes, and kill those that still run after a time [s] that all have together.
 
     A node of this package is told again and again: a signal may come before the interpreter
-    handles it, and the node takes the second one for the first. Other programs may take a second
-    one for an order to drop everything.
+    handles it. Other programs may take a second one for an order to drop everything.
     """
     for process in processes:
         process.interrupt()
@@ -194,12 +187,7 @@ def stop_all(processes: Sequence[NodeProcess], grace: float = GRACE) -> None:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """
-    Let a child be interrupted although this process is not.
-
-    A job in the background of a script ignores Ctrl-C; what is ignored is inherited, what is
-    handled is not.
-    """
+    """Let a child be interrupted although a job in the background, as this one, is not."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         yield

@@ -22,19 +22,11 @@ def recorded_experiment(
     experiment: Path, robot: str, seconds: float, out: Path, **moving: Any
 ) -> Path:
     """
-    Run a motion in the cell that is up, and return the bag of it.
+    Run a file of kind 'joints', which takes some time [s], in the cell that is up; return the bag.
 
     Recorder and generator are processes of their own, on the domain of this one. What measures, and
-    whatever follows the joint states, is part of the cell.
-
-    experiment: a file of kind 'joints'.
-    robot: as for the nodes.
-    seconds: how long the motion takes [s].
-    out: the bag; it must not exist.
-    moving: further parameters of the generator.
-
-    Raises DataError: the bag exists already. Raises TwinError: the generator or the recorder
-    failed; the message has what it said.
+    whatever follows the joint states, is part of the cell. ``moving``: further parameters of the
+    generator.
     """
     if out.exists():
         raise DataError(f"'{out}' exists already; it may be the recording of this experiment")

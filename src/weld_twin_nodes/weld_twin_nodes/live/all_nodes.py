@@ -42,11 +42,7 @@ def node_class(name: str) -> Any:
 
 
 def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
-    """
-    Refuse parameters that no node of this package has: a mistyped one would be passed over.
-
-    A parameter file may hold those of the other nodes too.
-    """
+    """Refuse parameters that no node of this package has: a mistyped one would be passed over."""
     known = {*own, *ROS_OWN}
     odd = [name for name in given if name not in known and not name.startswith(PREFIX)]
     if not odd:

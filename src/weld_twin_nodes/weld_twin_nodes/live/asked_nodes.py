@@ -28,11 +28,7 @@ ASK_EVERY = 0.2
 
 
 class AskedNodes:
-    """
-    Notes what the nodes of the recorder's own namespace say of themselves.
-
-    note: takes a key of the bag's provenance and its value.
-    """
+    """Notes what the nodes of the recorder's own namespace say of themselves."""
 
     def __init__(self, node: CellNode, note: Callable[[str, Any], None]) -> None:
         self._node, self._note = node, note

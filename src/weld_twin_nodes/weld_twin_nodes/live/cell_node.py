@@ -134,11 +134,7 @@ class CellNode(TellingNode):
         return ()
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
-        """
-        Take the robot: for the diagnostics to tell robots apart, and for what tells its joints.
-
-        joint_names: what its joint states call its joints.
-        """
+        """Take the robot, and what joint states call its joints, for the diagnostics."""
         self.arm, self.joint_names = robot, joint_names
         parts = self.get_namespace().strip('/'), '' if robot is None else robot.name
         self.health.hardware_id = self.setting('hardware_id') or '/'.join(filter(None, parts))
@@ -159,9 +155,8 @@ class CellNode(TellingNode):
 
         callback: takes an object that `weld_twin_msgs_py.messages.from_messages` reads. Messages
         of other types that stand for the same are turned into those of the table before.
-        required: the node can do nothing without this input; health calls its absence stale.
         at_once: do not wait for the subscribers of the outputs.
-        hold_last: see `watch`.
+        required, hold_last: see `watch`.
         """
         name = self.resolve_topic_name(topic.relative)
         if any(output.topic == name for output in self._outputs):

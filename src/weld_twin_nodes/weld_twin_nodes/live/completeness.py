@@ -42,8 +42,7 @@ class SentBook(Book):
         """
         Return a sentence for every input of nodes that has less than was sent.
 
-        What a node publishes is then as incomplete, though all of it may be recorded. Nodes that
-        were started again begin to count anew, and are passed over.
+        What they publish is as incomplete. Nodes that were started again are passed over.
         """
         out = []
         for node in sorted(nodes):

@@ -70,8 +70,7 @@ class ContactMarker(CellNode):
     """
     Answers the service ``~/mark``: publishes the contact, and adds a row to a table if told to.
 
-    Set the parameter ``label`` to what is touched now; refuses while any joint on the topic moves,
-    or while nothing is heard of the joints.
+    Refuses while any joint on the topic moves, or while nothing is heard of the joints.
     """
 
     settings: ClassVar[tuple[Setting, ...]] = (
@@ -119,12 +118,7 @@ class ContactMarker(CellNode):
         return f'contact {count} of {label!r}'
 
     def _standing(self) -> tuple[int, dict[str, float]]:
-        """
-        Return the newest stamp and where each joint is, all of which stand.
-
-        Joints of several publishers stand beside each other: which of them carry the arm is not
-        known here.
-        """
+        """Return the newest stamp and where each joint is, all of which stand, the arm's or not."""
         if not self._parts:
             raise DataError(f"nothing was heard on '{JOINT_STATES.name}'; is the arm on?")
         for names, part in self._parts.items():

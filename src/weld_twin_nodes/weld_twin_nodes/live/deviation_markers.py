@@ -37,12 +37,10 @@ WIDE, NARROW = 0.004, 0.001
 
 class DeviationLines:
     """
-    Keeps the way of the twin with the deviations on it.
+    Keeps the way of the twin with the deviations on it, drawn larger than true.
 
-    magnification: how much longer than true a deviation is drawn.
     tolerance: deviation drawn in full red [m]; none is green.
-    spacing: shortest way between two points kept [m].
-    points: how many are kept; the oldest go.
+    spacing: shortest way between two points kept [m]; of too many points the oldest go.
     """
 
     def __init__(

@@ -3,8 +3,7 @@
 """
 A diagnosis in a process of its own, so that a node goes on listening meanwhile.
 
-Run as a module it is that process: a `Job` comes in, pickled, and a `Finding` or the sentence of
-an error goes out.
+Run as a module it is that process: a `Job` comes in, a `Finding` or a sentence goes out.
 """
 
 from __future__ import annotations
@@ -60,11 +59,7 @@ class Finding(NamedTuple):
 
 
 class Worker:
-    """
-    Runs one job at a time in another process; nothing here waits for it.
-
-    tell: takes what the process writes on its standard error.
-    """
+    """Runs one job at a time in another process, and tells its errors; nothing waits here."""
 
     def __init__(self, tell: Callable[[str], object] = sys.stderr.write) -> None:
         self._tell = tell

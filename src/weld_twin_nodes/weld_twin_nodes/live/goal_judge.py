@@ -63,12 +63,7 @@ class GoalAudit:
         why: str,
         below: str = '',
     ) -> None:
-        """
-        Tell what became of a goal.
-
-        model: digest of the model.
-        below: what the controller said where it did not take it.
-        """
+        """Tell what became of a goal; ``below``: what a controller said that did not take it."""
         largest = None if result is None else result.largest
         line: dict[str, Any] = {
             'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
@@ -137,11 +132,7 @@ class GoalJudge:
         start: Start,
         done: Callable[[Judged], None],
     ) -> None:
-        """
-        Work a goal out; then tell.
-
-        names: what it calls the joints of the robot.
-        """
+        """Work a goal out, its joints called by the names it has; then tell."""
         try:
             points = self._read(goal, names)
         except TwinError as error:

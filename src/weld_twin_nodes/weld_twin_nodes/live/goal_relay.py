@@ -61,8 +61,6 @@ class GoalRelay:
     """
     Serves ``~/follow_joint_trajectory``, and is a client of the controller's.
 
-    kind: `control_msgs/FollowJointTrajectory`.
-    controller: name of the controller, or of its action.
     decide: takes a goal and returns what becomes of it, when that is known.
     since: takes the token of a decision; returns what has happened to the model since, in words.
     """

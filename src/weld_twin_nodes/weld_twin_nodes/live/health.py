@@ -21,17 +21,7 @@ from .words import HEARD, NODE, REACHED, RUN, SENT, Sent
 
 
 class Output:
-    """
-    A publisher that counts.
-
-    stamped: its messages begin with a header.
-
-    Attributes
-    ----------
-    topic : str
-        Under which name it publishes, remapped and in its namespace.
-
-    """
+    """A publisher that counts; its ``stamped`` messages begin with a header."""
 
     def __init__(self, publisher: Any, *, stamped: bool) -> None:
         self.publisher = publisher
@@ -86,11 +76,9 @@ thermometer that is read every ten seconds: it is silent when it misses one."""
 
 class Input:
     """
-    One input of a node.
+    One input of a node, stale after ``patience`` [s], or five periods where that is longer.
 
-    required: whether the node can do nothing without it.
-    patience: silence after which it is stale [s]; five of its periods where that is longer.
-    Infinite for an input that comes when there is something to tell.
+    Patience is infinite for an input that comes when there is something to tell.
     """
 
     def __init__(self, topic: str, required: bool, patience: float) -> None:

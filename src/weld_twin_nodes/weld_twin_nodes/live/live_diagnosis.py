@@ -61,13 +61,7 @@ SIGNALS = (Role.WRENCH, Role.TEMPERATURE)
 
 
 class Window:
-    """
-    Streams of the cell over a sliding window, bounded in time and number.
-
-    duration: [s]
-    measuring_frame: what measurements must be given in; empty for the first frame that comes.
-    joint_names: what the joint states call the joints, in the order of the robot.
-    """
+    """Streams of the cell over a sliding window, bounded in time [s] and number."""
 
     def __init__(
         self,
@@ -105,21 +99,13 @@ class Window:
         return tuple(image for image in self._images if image[0] >= joints[0][0])
 
     def take_image(self, message: Any) -> None:
-        """
-        Take the points that a camera found in an image.
-
-        Raises DataError: it cannot be used; the window is as it was.
-        """
+        """Take the points that a camera found in an image; nothing where they are of no use."""
         self._images.append((stamp_ns(message), message.header.frame_id, points(message)))
         while self._images[-1][0] - self._images[0][0] > self._duration:
             self._images.popleft()
 
     def take(self, role: Role, message: Any) -> None:
-        """
-        Take a message.
-
-        Raises DataError: it cannot be used; the window is as it was.
-        """
+        """Take a message; nothing of one that cannot be used."""
         taken = self.intake.take(role, message)
         if taken is None:
             return
@@ -137,11 +123,9 @@ class Window:
 
     def recording(self, least: float) -> Recording | None:
         """
-        Return what the window holds, or None while it is too little to be diagnosed.
+        Return what the window holds, or None while it overlaps too short [s] to be diagnosed.
 
         What images tell is for whoever has the time: `images`.
-
-        least: shortest time that measurements and joint states must overlap [s].
         """
         joints = self._streams.get(Role.JOINTS)
         role, measured = self._measured()
@@ -191,8 +175,7 @@ class LiveDiagnosis(ManagedNode):
     """
     Diagnoses a sliding window again and again, in another process.
 
-    Nothing is published before a gap was found; from then on every verdict is, so that its end
-    is reported too.
+    From the first gap on every verdict is published, so that its end is reported too.
     """
 
     settings: ClassVar[tuple[Setting, ...]] = (

@@ -81,15 +81,7 @@ class Counted:
 
 
 class Losses:
-    """
-    The losses of one input, and whether they are still going on.
-
-    Attributes
-    ----------
-    telling : str
-        What to report as long as messages go missing; empty where none do.
-
-    """
+    """The losses of one input, and, as long as they go on, what to report: `telling`."""
 
     def __init__(self, state: Input) -> None:
         self._state = state

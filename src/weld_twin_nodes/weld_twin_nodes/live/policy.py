@@ -147,11 +147,9 @@ def policy(
     namespace: str = '', remaps: Mapping[str, str] | None = None, nodes: Sequence[str] = ()
 ) -> str:
     """
-    Return the policy as `ros2 security create_permission` reads it.
+    Return the policy as `ros2 security create_permission` reads it, for some nodes or all.
 
-    namespace: of all the nodes.
     remaps: names as the nodes have them, with or without the namespace, to the names they get.
-    nodes: nodes it is for; none for all.
     """
     chosen = tuple(nodes) or tuple(SPOKEN)
     unknown = [name for name in chosen if name not in SPOKEN]

@@ -136,14 +136,8 @@ class RecordedTopic:
     It asks for reliable delivery until a publisher is seen that does not offer it: what comes
     before the first look at the publishers is then not lost either.
 
-    given: name without a slash where it is in the namespace of the node.
     write: takes the topic, the type and the bytes of a message.
-
-    Attributes
-    ----------
-    announced : str
-        Type that the bag knows; the writer's to set.
-
+    `announced`: type that the bag knows; the writer's to set.
     """
 
     def __init__(

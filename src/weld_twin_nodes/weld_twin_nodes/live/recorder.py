@@ -59,10 +59,8 @@ LONGEST = 9.0
 
 class RecordingRun:
     """
-    Writes messages as they arrive, unread, until it is ended.
+    Writes messages as they arrive, unread, until it is ended; then, or when it cannot, ``done``.
 
-    node: the recorder, with its parameters.
-    done: is called when everything is there, or nothing can be written any more.
     joins: it begins at a moment of its own: what was sent before is none of it.
     """
 

@@ -134,11 +134,7 @@ def place_robot(node: CellNode, robot: Robot) -> Robot:
 
 
 def place_twin(node: CellNode, twin: Twin) -> Twin:
-    """
-    Return the twin of a model likewise, and warn of what in it may be a slip.
-
-    The parameter counts more than a fitted base.
-    """
+    """Return the twin of a model, placed likewise; a parameter counts more than a fitted base."""
     say_doubts(node, twin.robot, twin.effects)
     robot = place_robot(node, twin.robot)
     moved = abs(robot.T_world_base - twin.robot.T_world_base).max()

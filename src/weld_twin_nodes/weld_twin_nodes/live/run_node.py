@@ -36,12 +36,7 @@ LOOP = 0.25
 
 
 def executor(name: str = 'events') -> Executor:
-    """
-    Return what serves a node.
-
-    The events executor costs a third of the other per message; an rclpy that has none gives the
-    other.
-    """
+    """Return what serves a node: the events executor costs a third of the other per message."""
     if name == 'events':
         with suppress(ImportError):  # it came with an update of Jazzy
             from rclpy.experimental import EventsExecutor
@@ -106,11 +101,7 @@ def spin(node: CellNode, stop: Stop) -> None:
 
 
 def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
-    """
-    Run a node until it is done or stopped; return the exit code, 2 for unusable settings.
-
-    With ``--help`` it prints what the node takes instead.
-    """
+    """Run a node until it is done or stopped, or print what it takes; return the exit code."""
     words = sys.argv[1:] if args is None else args
     if any(word in HELP for word in words):
         file = sys.modules[make.__module__].__file__ or 'node'

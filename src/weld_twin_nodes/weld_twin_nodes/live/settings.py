@@ -27,12 +27,7 @@ CHOICES = {'reliability': (RELIABLE, BEST_EFFORT), 'durability': (VOLATILE, LATC
 
 
 class QosOverrides:
-    """
-    What the parameters of a node say of its topics.
-
-    given: names of the parameters that the node was started with.
-    topics: what the node may have, under the names they have for it.
-    """
+    """What the parameters that a node was started with say of its topics, by the names it has."""
 
     def __init__(self, node: Node, given: Iterable[str], topics: Collection[str]) -> None:
         self._node = node

@@ -32,10 +32,6 @@ def unheard_publishers(
     """
     Return a sentence for every publisher of a topic of which nothing arrives.
 
-    infos: the publishers.
-    topic: its name after remapping, with the namespace.
-    kind: message type that is asked for.
-    wanted: quality of service that is asked for.
     understood: types that could be taken instead, if nobody published the one that is.
     """
     out = []
@@ -55,9 +51,7 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
     """
     Return where the input may be that nobody publishes, in a sentence; empty where nowhere.
 
-    topic: the input's name after remapping, with the namespace.
-    own: its name in the table of topics, which another namespace would go before.
-    kinds: types that are understood.
+    topic: the input's name after remapping; ``own``: that in the table of topics.
     """
     longer = tuple(name for name in BY_NAME if name != own and name.endswith(own))
     for name, there in node.get_topic_names_and_types():
@@ -181,15 +175,7 @@ class Source:
     """
     One input of a node, by a subscription that is made anew when its publishers are others.
 
-    take: takes the type and the bytes of a message.
-
-    Attributes
-    ----------
-    kind : str
-        The type that is taken now; empty while none is known.
-    infos : list of TopicEndpointInfo
-        All publishers, as the graph had them at the last look.
-
+    take: takes the type and the bytes of a message. `kind`: the type that is taken now, or empty.
     """
 
     def __init__(

@@ -30,14 +30,8 @@ class TellingNode(Node):
     """
     A node with its health.
 
-    Attributes
-    ----------
-    neighbours : NeighbourHealth
-        What the others tell.
-    partners : list of callable
-        Each returns a sentence for everybody at the other end of a topic whom nothing reaches, or of
-        whom nothing comes.
-
+    partners: each returns a sentence for everybody at the other end of a topic whom nothing
+    reaches, or of whom nothing comes.
     """
 
     def __init__(self, name: str, **kwargs: Any) -> None:
@@ -137,8 +131,7 @@ class TellingNode(Node):
         """
         Return a new input, whose rate, age and losses are reported from now on.
 
-        hold_last: its last value counts until the next one comes; that it does so without a source
-        is reported.
+        hold_last: its last value counts until the next one comes, and that is reported.
         """
         state = self.health.watch(name, required=required, steady=steady)
         self._losses[name] = Losses(state)

@@ -66,13 +66,7 @@ def frames_of(node: CellNode) -> Frames:
 
 
 class MeasuredInputs:
-    """
-    The measurements of a node, carried into the measuring frame where `/tf` tells the way.
-
-    Without the parameter ``measuring_frame`` they are taken as they come.
-
-    use: takes what a message tells, a pose or a point, and the message.
-    """
+    """The measurements of a node, carried into its ``measuring_frame``, if any, by `/tf`."""
 
     def __init__(self, node: CellNode, use: Callable[[Role, Any], None]) -> None:
         self._node = node
@@ -147,12 +141,7 @@ class MeasuredInputs:
 
 
 def transformed(message: Any, T: Array, frame_id: str) -> Any:
-    """
-    Return a pose or a point in another frame.
-
-    T: where the frame of the message is in the other, shape (4, 4).
-    frame_id: name of the other.
-    """
+    """Return a pose or a point in another frame, in which its own is at ``T``."""
     header = Header(message.header.stamp, frame_id)
     if hasattr(message, 'point'):
         at = T[:3, :3] @ from_messages.point(message) + T[:3, 3]

@@ -53,8 +53,7 @@ def apart(book: Book, there: Collection[str]) -> list[str]:
     """
     Return whose word or whose listeners are still to come, among the nodes there are.
 
-    The graph a node sees is its own: that two others have not found each other yet, only they know,
-    and one of the two may know it before the other.
+    That two others have not found each other yet only they know, and perhaps one alone.
     """
     words = [word for word in book.latest() if word.node in there]
     known = [node for node in there if node.rpartition('/')[2] in MODULES]
@@ -73,11 +72,7 @@ def apart(book: Book, there: Collection[str]) -> list[str]:
 
 
 def beyond(book: Book, there: Collection[str], publishers: Count, subscribers: Count) -> list[str]:
-    """
-    Return whom the nodes that are there have met and the own graph does not show yet.
-
-    publishers, subscribers: from the name of a topic to how many the own graph has.
-    """
+    """Return whom the nodes that are there have met and the own graph does not show yet."""
     out = []
     for word in book.latest():
         if word.node in there:
@@ -100,9 +95,7 @@ class Meeting:
 
     With ``wait_for_subscribers`` it waits for that many. Without, for a graph that has at least
     one listener and no longer changes, on which the nodes of the project reach each other. Either
-    wait has an end, at which it says what is missing.
-
-    within: longest wait [s].
+    wait has an end [s], at which it says what is missing.
     """
 
     def __init__(self, node: CellNode, within: float, action: Callable[[], None]) -> None:
@@ -154,12 +147,10 @@ starve a listener for a second or two, and a wider window would then overflow it
 
 class Pump:
     """
-    Hands out sample numbers to send.
+    Hands out sample numbers to send, for increasing stamps (N,) [ns].
 
-    stamps: header stamps, increasing, shape (N,) [ns].
     playback: run speed against the stamps; 0 is as fast as the listeners keep up.
-    window: how many samples may be under way that nobody has answered yet.
-    answered: whether answers are wanted at all; without them the window is not kept.
+    window: how many samples may be under way that nobody has answered, if answers are wanted.
     """
 
     def __init__(

@@ -151,8 +151,7 @@ def reader(kind: str) -> Callable[[bytes], Any]:
     """
     Return what turns serialised messages of a type into objects.
 
-    Types of standard packages are read here. Others, whose definitions differ from release to
-    release, are read by the package that is installed.
+    Types of other than standard packages differ by release, and are read by their package.
     """
     if kind in READERS or kind == JOINT_STATES.type:
         return decoder(kind)

@@ -15,8 +15,7 @@ class WorkBeside:
     """
     Does one thing after the other.
 
-    The pools of `concurrent.futures` are waited for by an interpreter that ends, for as long as a disk
-    does not answer or a long goal takes. What is not done here by then is given up.
+    An interpreter that ends waits for pools of `concurrent.futures`, and not for this.
     """
 
     def __init__(self) -> None:

@@ -30,13 +30,7 @@ Corners = tuple[list[str], np.ndarray]
 
 
 def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
-    """
-    Return what finds the corners of a board in an image file.
-
-    board: ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
-    ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it; or ``board: tags``, their
-    numbers and ``dictionary``.
-    """
+    """Return what finds the corners of a board in an image file; of its numbers, `read_board`."""
     try:
         import cv2  # an extra of its own: few need it, and it weighs 60 MB
     except ImportError:

@@ -15,12 +15,7 @@ from weld_twin_core.errors import DataError
 
 
 def digest(*values: Any) -> str:
-    """
-    Return 32 hexadecimal digits that stand for the content of values.
-
-    Arrays, numbers, strings, None, mappings, sequences, classes, functions and dataclasses of
-    these.
-    """
+    """Return 32 hexadecimal digits that stand for plain values, arrays, functions, dataclasses."""
     state = hashlib.sha256()
     for value in values:
         _feed(state, value)

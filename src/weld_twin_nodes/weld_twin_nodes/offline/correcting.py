@@ -89,14 +89,7 @@ class CorrectedProgram:
 def program_model(
     robot: Robot, path: Path | str, temperature: float | None = None, setup: int = 0
 ) -> ProgramModel:
-    """
-    Return what a model file says acts on the arm that runs a program.
-
-    ``path``: diagnosis.json, or an effects file. ``temperature`` [degC]. ``setup``: which base
-    frame of the diagnosis, counted from 0.
-    Raises ModelError: the file is of no use, of another robot, or its data were unsound. Raises
-    DataError: no arm is so cold or warm.
-    """
+    """Return what a model file says acts on the arm of a program at a temperature [degC]."""
     if temperature is not None:
         checked_temperature(temperature)
     content = diagnosis_of(path)
@@ -289,13 +282,9 @@ def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
     """
     Return where the tool was meant to go and where it is commanded to instead, for `verifying`.
 
-    Returns
-    -------
-    list of mapping
-        For each stretch ``tool`` (``T_flange_tool``), and ``meant`` and ``commanded``: poses in the base
-        frame of the model by position [m] and rotation vector [rad], one for one. Along corrected
-        linear and circular moves; at the ends of all moves where there are none.
-
+    For each stretch ``tool`` (``T_flange_tool``), and ``meant`` and ``commanded``: poses in the base
+    frame of the model by position [m] and rotation vector [rad], one for one. Along corrected
+    linear and circular moves; at the ends of all moves where there are none.
     """
     out = []
     seams = any(
@@ -344,10 +333,8 @@ def tolerance_entry(
     made: CorrectedProgram, model: ProgramModel, tolerance: float, noise: float
 ) -> dict[str, Any]:
     """
-    Return how probably the tool keeps a tolerance all along, before and after, as plain JSON values.
+    Return how probably the tool keeps a tolerance [m] all along, before and after.
 
-    model: it was corrected with.
-    tolerance: of the tool's distance from where the program means it [m].
     noise: standard deviation of a measured coordinate, of postures measured in addition [m].
     """
     if not 0.0 < tolerance < 1.0:
@@ -409,11 +396,7 @@ class LoadedModel:
     modified: float  # when the file was written [s since 1970]
 
     def outdated(self, most_age: float = 0.0) -> str:
-        """
-        Return why the model is not fresh; empty where it is.
-
-        ``most_age`` [s]: age of the file above which it is not; 0 for any.
-        """
+        """Return why the model is not fresh, or older than an age [s] above 0; else nothing."""
         try:
             now = self.path.stat().st_mtime
             changed = now != self.modified and _digest(self.path) != self.digest

@@ -72,12 +72,7 @@ def export(
     trigger: int,  # number of the output that triggers the instrument
     seam_speed: float = 0.0,  # [m/s], of a seam; 0 for that of its time law
 ) -> tuple[Exported, str, list[str]]:
-    """
-    Return the program of a seam or an experiment, its text, and what to look out for.
-
-    Raises DataError, PathError: the file cannot be read, leaves the robot's limits, or the
-    language cannot say it.
-    """
+    """Return the program of a seam or an experiment, its text, and what to look out for."""
     robot = context.robot
     _refuse_slides(context, language)
     plan = _planned(path, robot, seam_speed)

@@ -53,12 +53,7 @@ def where_it_holds(posterior: Posterior) -> list[str]:
 
 
 def elsewhere(posterior: Posterior, corrected: bool) -> str:
-    """
-    Return that what is said holds where it was measured, in a sentence, and how wide it is beyond.
-
-    How far it is off where it was measured is what is left of the gap, reported as such. What
-    is promised elsewhere holds for the ``corrected`` robot, and for no other.
-    """
+    """Return that what is said holds where it was measured, and how wide it is beyond."""
     if not corrected:
         return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
     if posterior.region is not None:
@@ -81,11 +76,7 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
 
 
 def file_alone(alone: Alone, *, left: bool) -> list[str]:
-    """
-    Return what a robot file leaves by itself, beside the whole model, in sentences for its head.
-
-    ``left``: whether the model has effects that the file cannot hold.
-    """
+    """Return what a robot file leaves beside the whole model, in sentences for its head."""
     by_itself = (
         f'{_mm(alone.recorded_m)} where it was recorded and {_mm(alone.unseen_m)} on data that were '
         'not fitted'
@@ -155,8 +146,6 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
 
     Only zeros that are named are to be set: others that a model has beside them may stand
     against its springs and lengths, and do harm without them.
-
-    A table is read by spreadsheets; where the model holds stands in the other files.
     """
     del notes
     robot = model.robot
@@ -205,12 +194,7 @@ FORMATS: dict[str, tuple[str, Callable[[Path, Model, Sequence[str]], None]]] = {
 def write_all(
     directory: Path, model: Model, notes: Sequence[str] = (), given: GivenUrdf | None = None
 ) -> None:
-    """
-    Write the model in every form.
-
-    ``notes``: where it holds. ``given``: the URDF that the robot was read from, whose names the
-    corrected one keeps.
-    """
+    """Write the model in every form; the URDF that was given lends names to the corrected one."""
     for name, write in FORMATS.values():
         write(directory / name, model, notes)
     if given is not None:
@@ -264,9 +248,8 @@ def _zeros(model: Model) -> np.ndarray:
     """
     Return what was added to the readings before the diagnosis, shape (n,) [rad or m].
 
-    A zero is the arm's or its controller's, and belongs into the files, so that they take the
-    readings as they were recorded. Columns, signs and units that were mixed up belong to the
-    recording alone: a file that repeated them would be wrong at the robot.
+    A zero is the arm's or its controller's, so files take readings as they were recorded. Columns,
+    signs and units that were mixed up belong to the recording alone.
     """
     matrix, offset = model.reading_map()
     return offset if np.array_equal(matrix, np.eye(model.robot.n)) else np.zeros(model.robot.n)

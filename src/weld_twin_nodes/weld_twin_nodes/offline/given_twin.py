@@ -72,11 +72,7 @@ def refuse_mended(content: Mapping[str, Any], path: Path | str) -> None:
 
 
 def by_effort(path: Path | str) -> bool:
-    """
-    Return whether springs of a model file take the measured efforts of the joints.
-
-    ``path``: diagnosis.json, or an effects file. Raises ModelError: the file cannot be read.
-    """
+    """Return whether springs of a model file take the measured efforts of the joints."""
     content = diagnosis_of(path)
     model = content.get('model') or {}
     entries = [*model.get('known', ()), *model.get('found', ())]

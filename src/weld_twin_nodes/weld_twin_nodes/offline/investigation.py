@@ -49,19 +49,10 @@ def weighed(
     together: Mapping[str, Any], alone: Mapping[str, Any] | None = None
 ) -> tuple[Mapping[str, Any], str]:
     """
-    Return which diagnosis to believe, and whether and why it closes the question.
+    Return which diagnosis to believe, and why it closes the question; empty where it does not.
 
-    together: the diagnosis of all recordings.
-    alone: that of the experiments without the recordings before them.
-
-    Returns
-    -------
-    believed : mapping
-        The one that is believed; where there were two, its confidence is that of both. If both name
-        the same, it is that of all recordings, unless only the other closes the question.
-    why : str
-        In words why it closes the question; empty where it does not.
-
+    alone: that of the experiments without the recordings before them. If both name the same, it is
+    that of all recordings, with the confidence of both, unless only the other closes the question.
     """
     if alone is None:
         return together, closes(together)
@@ -86,11 +77,7 @@ def _asking(result: Mapping[str, Any], heard: Sequence[Mapping[str, Any]]) -> Ma
 
 
 def closes(result: Mapping[str, Any]) -> str:
-    """
-    Return why a diagnosis closes the question by itself; empty where it does not.
-
-    ``result``: the content of diagnosis.json.
-    """
+    """Return why a diagnosis closes the question by itself; empty where it does not."""
     verdict = result['verdict']
     if not is_sure(verdict) or verdict['status'] not in STATED:
         return ''
@@ -101,21 +88,13 @@ def closes(result: Mapping[str, Any]) -> str:
 
 
 def is_sure(verdict: Mapping[str, Any]) -> bool:
-    """
-    Return whether an answer is reported as sure.
-
-    ``verdict``: of diagnosis.json, of either schema.
-    """
+    """Return whether an answer of diagnosis.json, of either schema, is reported as sure."""
     sure = verdict.get('sure')
     return float(verdict['confidence'] or 0.0) >= OLDER if sure is None else bool(sure)
 
 
 def belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> float:
-    """
-    Return how probable it is that an answer is right, with another of most of the same measurements.
-
-    ``result`` and ``other``: as `signs` takes them.
-    """
+    """Return how probable an answer is, with another of most of the same measurements."""
     own, same, against = signs(result, other)
     total = OWN * own + FOR * same + AGAINST * against + BEGIN
     return min(1.0 / (1.0 + exp(-total)), MOST)
@@ -127,8 +106,6 @@ def signs(result: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, f
 
     The other counts where it is likelier right than wrong. What it leaves unknown speaks for nothing:
     it may be what poor recordings hide.
-
-    ``result`` and ``other``: the contents of two diagnosis.json.
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0
@@ -228,12 +205,7 @@ State = dict[str, Any]
 
 
 def begin(robot: str, options: Sequence[str], budget: float) -> State:
-    """
-    Return the state of an investigation without any recording yet.
-
-    ``robot``: as the user named it. ``options``: further words for every diagnosis. ``budget``
-    ([min]): that all experiments together may take.
-    """
+    """Return the state of an investigation without any recording yet; its budget is in minutes."""
     return {
         'schema': SCHEMA,
         'robot': robot,
@@ -338,11 +310,9 @@ def question(
     result: Mapping[str, Any], remaining: float, asked: Sequence[str], why: str | None = None
 ) -> dict[str, Any] | tuple[str, str]:
     """
-    Return the next experiment, or why there is none: a word for the state, and a sentence.
+    Return the next experiment within the minutes that remain, or a word and a sentence why none.
 
-    ``result``: the content of diagnosis.json. ``remaining`` [min]: of the budget. ``asked``:
-    kinds of experiment that were made already. ``why``: why the question is closed, as `weighed`
-    tells it; left out, this diagnosis alone counts.
+    ``why``: why the question is closed, as `weighed` tells it; left out, this diagnosis counts.
     """
     if result['verdict']['status'] == 'unsound':
         return 'unsound', 'data or set-up are wrong; the page of the last round says what'
@@ -417,9 +387,6 @@ def decided(asked: Mapping[str, Any], result: Mapping[str, Any]) -> bool | None:
     It did where causes are named now, or excluded, and at most one of its two explanations is
     among those that cannot be told apart. Where still no name fits, it did if the place and the
     dependence of one of the two are found, and those of the other are not.
-
-    ``asked``: as `question` returned it. ``result``: the content of the diagnosis.json with the
-    new recording.
     """
     if not asked.get('between'):
         return None

@@ -170,13 +170,9 @@ def plan_table(plan: Planned, tolerance: float) -> list[str]:
 
 def write_plan(folder: Path, context: Context, language: str | None, plan: Planned) -> None:
     """
-    Write the stations and the table to fill in.
+    Write the stations and the table to fill in, its joints named as in a language.
 
-    The table has the joint angles that are asked for, as the pendant shows them; where the arm
-    stands at others, those count.
-
-    ``context``: the robot, and how its controller counts. ``language``: of the controller, for its
-    names of the joints.
+    The table has the joint angles that are asked for; where the arm stands at others, those count.
     """
     robot = context.robot
     t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)

@@ -104,10 +104,9 @@ def write_list(folder: Path, results: Mapping[str, Mapping[str, str]]) -> None:
 
 def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -> Change:
     """
-    Return what is to happen in a folder so that it has the files made.
+    Return what is to happen in a folder so that it has the files made, by their digests.
 
-    ``made``: digests of the new files by name. ``adds``: whether files of this result that were
-    not made again stay.
+    ``adds``: whether files of this result that were not made again stay.
     """
     own = listed(folder).get(mark, {})
     # The mark comes last: who finds the new one finds all the others.
@@ -140,11 +139,7 @@ def decide(scratch: Path, change: Change) -> None:
 
 
 def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -> None:
-    """
-    Do what the note of a scratch directory says, as far as it is not done; nothing without a note.
-
-    ``kept``: called with every file that was not ours: its name, and the name that it has now.
-    """
+    """Do what the note of a scratch directory says and is not done; tell what was kept."""
     try:
         change = _decided(scratch / NOTE)
     except _DAMAGED:
@@ -312,23 +307,14 @@ def new_directory(
 
 
 def write_owned(path: Path | str, text: str) -> None:
-    """
-    Write a text file into a folder that may be anybody's; what is in the way gets another name.
-
-    For what took long to compute: it is never refused.
-    """
+    """Write a text into a folder that may be anybody's; what is in the way gets another name."""
     with new_file(path, force=True) as file:
         write_text(file, text)
 
 
 @contextmanager
 def new_file(path: Path | str, *, force: bool = False) -> Iterator[Path]:
-    """
-    Yield where to write what comes to ``path`` when the block succeeds, and more files beside it.
-
-    ``path``: a file, in a folder that may be anybody's. A link is followed. ``force``: as
-    `new_directory` takes it.
-    """
+    """Yield where to write what comes to ``path``, and beside it, when the block succeeds."""
     target = followed(path)
     if target.is_dir():
         raise DataError(f"'{path}' is a folder; give a file")

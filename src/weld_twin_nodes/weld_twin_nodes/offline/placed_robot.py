@@ -26,12 +26,7 @@ ROWS = 4000
 
 
 def placed(recording: Recording, robot: Robot, align: frozenset[str]) -> tuple[Robot, list[str]]:
-    """
-    Return the robot in the frame of the measurements, and sentences that say how.
-
-    ``align``: frames to fit: 'base', 'tool', both or none. Raises DataError: nothing was measured,
-    or too few different poses to fit the frames on.
-    """
+    """Return the robot in the frame of the measurements, and sentences that say how."""
     if not align:
         return robot, ['base and tool are where the robot file has them; nothing was fitted']
     names = ' and '.join(sorted(align))

@@ -155,11 +155,7 @@ def write_prediction(
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
 ) -> Written:
-    """
-    Write the recording with the twin's pose at every joint state, its covariance, deviations.
-
-    The stretches outside what was recorded go into `BESIDE`, in the bag's directory.
-    """
+    """Write the recording with the twin's poses, covariance, deviations, and `BESIDE` it."""
     twin = model.twin
     poses = twin.poses(recording, recording.joints.t)
     expected, outside = model.expected(recording), model.outside(recording)
@@ -361,8 +357,6 @@ def write_prediction_table(path: Path | str, model: Predictor, recording: Record
     Where the model knows how sure it is, it is the one of all models allowed, and standard
     deviations along and about the world's axes follow, and whether the pose lies outside what was
     recorded (1) or not (0).
-
-    ``path``: must not exist. Raises DataError: the file exists or cannot be written.
     """
     t = recording.joints.t
     expected = model.expected(recording)

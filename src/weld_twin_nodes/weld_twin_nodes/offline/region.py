@@ -46,8 +46,7 @@ def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:
     """
     Return postures of the whole reach that judge it, shape (K, n), and stations clear of the floor.
 
-    ``spread`` [rad]: half the range of every joint about the posture of a usual seam, for the
-    stations.
+    ``spread`` [rad]: half the range of stations about the posture of a usual seam.
     """
     return postures_within_limits(robot, ANYWHERE), clear_postures(robot, spread)[:POSTURES]
 
@@ -59,8 +58,6 @@ def region(
     Return postures of a region, those that judge it, shape (K, n), and those that may be measured.
 
     given: ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
-    context: for programs; with the frames of the program alone where left out.
-    language: of a program, where its file does not tell it.
     """
     if Path(given).is_dir():
         q = read_recording(given, robot).joints.q

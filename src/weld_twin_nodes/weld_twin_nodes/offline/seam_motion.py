@@ -25,15 +25,10 @@ def plan_motion(
     robot: Robot, path: str, profile: str = 'smooth', rate: float = 125.0, speed: float = 0.0
 ) -> Plan:
     """
-    Return the planned motion along a seam.
+    Return the planned motion along a bundled seam or one of a file, at a rate [1/s].
 
-    path: a kind of bundled seam, or the path of a path file.
-    profile: name of a time law.
-    rate: [1/s]
-    speed: speed of the time law, refused where a joint cannot follow [m/s]; 0 is the law's own,
+    speed: of the time law, refused where a joint cannot follow [m/s]; 0 is the law's own,
     slowed down as far as the joints need it.
-
-    Raises PathError: the seam cannot be read, reached or followed.
     """
     law = _law(profile, speed)
     if path in KINDS:
@@ -46,11 +41,7 @@ def plan_motion(
 def joint_motion(
     robot: Robot, path: str, profile: str = 'smooth', rate: float = 125.0, speed: float = 0.0
 ) -> JointMotion:
-    """
-    Return the motion of a file of kind 'joints', or the planned one along a seam.
-
-    Raises DataError, PathError: the file cannot be read, or its motion is not one for this robot.
-    """
+    """Return the motion of a file of kind 'joints', or the planned one along a seam."""
     given = None if path in KINDS else read_joint_motion(path, robot)
     if given is None:
         return plan_motion(robot, path, profile, rate, speed).motion
@@ -63,11 +54,7 @@ def joint_motion(
 def plan_through(
     robot: Robot, points: Array, profile: str = 'smooth', rate: float = 125.0, speed: float = 0.0
 ) -> Plan:
-    """
-    Return the planned motion along the spline through points, shape (N, 3) [m], torch upright.
-
-    Raises PathError: the seam cannot be reached or followed.
-    """
+    """Return the planned motion along the spline through points, (N, 3) [m], torch upright."""
     seam = from_mapping({'kind': 'points', 'points': points.tolist()})
     return plan(robot, seam, _law(profile, speed), rate, fit=not speed)
 
@@ -80,12 +67,7 @@ def _law(profile: str, speed: float) -> Profile:
 
 
 def sampled(robot: Robot, motion: JointMotion, rate: float) -> JointMotion:
-    """
-    Return a motion at so many samples a second, by cubics through its points.
-
-    Raises DataError: it leaves the limits of the robot. Raises PathError: it would have more
-    samples than make sense.
-    """
+    """Return a motion at so many samples a second, by cubics through its points."""
     refuse_endless(float(motion.t[-1]), 1.0 / rate)
     count = max(round(float(motion.t[-1]) * rate), 1)
     t = np.linspace(0.0, float(motion.t[-1]), count + 1)

@@ -67,8 +67,7 @@ def with_changes(
     """
     Return recordings that say what was changed, and which errors may differ between them.
 
-    ``recordings``: the first is what the others are compared with. ``changes``: by recording,
-    counted from 0. ``robot``: as it is without the changes.
+    The first recording is what the others are compared with, and changes are by recording.
     """
     differs = {change.kind for change in changes.values()} & set(FRAMES)
     if 0 in changes and changes[0].kind in FRAMES:

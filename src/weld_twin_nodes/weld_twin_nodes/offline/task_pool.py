@@ -61,12 +61,7 @@ class Pool(Protocol):
 
 
 class Runner:
-    """
-    Runs tasks on a pool and keeps their results; closes the pool when its block ends.
-
-    store: directory of results; a task whose result is there already is not run again.
-    tell: called after every task.
-    """
+    """Runs tasks on a pool and keeps their results in ``store``, to ask for none again."""
 
     def __init__(self, pool: Pool, store: Path | None = None, tell: Tell | None = None) -> None:
         self._pool, self._store, self._tell = pool, store, tell
@@ -80,11 +75,7 @@ class Runner:
     def run(
         self, tasks: Sequence[Task], meanwhile: Callable[[], object] | None = None
     ) -> list[Plain]:
-        """
-        Return the results in the order of the tasks.
-
-        ``meanwhile``: what this process does once others have the tasks.
-        """
+        """Return the results in the order of the tasks; ``meanwhile``: done while others work."""
         results: list[Plain] = [None] * len(tasks)
         waiting = []
         for k, task in enumerate(tasks):
@@ -146,14 +137,9 @@ class Here:
 
 class Cores:
     """
-    Processes on this machine, each with one thread.
+    Processes on this machine, each with one thread, that begin to import a module ``ahead``.
 
-    The processes start anew, so that no library has chosen its threads before, and stay until
-    the pool is closed.
-
-    workers: 0 means one for every core.
-    ahead: a module that the processes begin to import at once, while this one goes on; left out,
-    they start with the first task.
+    The processes start anew, so that no library has chosen its threads before.
     """
 
     def __init__(self, workers: int = 0, ahead: str = '') -> None:
@@ -214,12 +200,7 @@ class Cluster:
 
 
 def pool_of(scheduler: str = '', workers: int = 0, ahead: str = '') -> Pool:
-    """
-    Return the cluster at an address, or the cores of this machine.
-
-    ``scheduler``: address of the cluster; empty for this machine. ``workers``: processes of this
-    machine; 0 means one for every core. ``ahead``: a module that these begin to import at once.
-    """
+    """Return the cluster at an address, or so many cores of this machine, all of them for 0."""
     if workers < 0:
         raise DataError(f'the number of workers must not be negative, got {workers}')
     return Cluster(scheduler) if scheduler else Cores(workers, ahead)
@@ -229,8 +210,7 @@ def _leave_interrupts() -> None:
     """
     Leave Ctrl-C to the process that asks, which ends this one.
 
-    A terminal interrupts all processes at once, and a worker interrupted while it takes a task
-    keeps the lock of the queue: nobody would end.
+    A worker interrupted while it takes a task keeps the lock of the queue: nobody would end.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

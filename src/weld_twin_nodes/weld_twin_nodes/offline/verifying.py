@@ -168,12 +168,7 @@ def verified(
     align: str = '',  # frames that are fitted anew; the others are as the diagnosis had them
     setup: int = 0,  # which base frame of the diagnosis, counted from 0
 ) -> Verification:
-    """
-    Return what was measured after a correction beside what was promised.
-
-    Raises DataError: nothing was measured, the set-up stands elsewhere, or the recording is not of
-    the program.
-    """
+    """Return what was measured after a correction beside what was promised."""
     seen = _Seen.of(model, recording, align, setup)
     wanted, notes = None, list[str]()
     if correction is not None:
@@ -225,11 +220,7 @@ def _refuse_elsewhere(rms: float, gap: float, align: str) -> None:
 
 
 class _Offs(NamedTuple):
-    """
-    What is off at every sample (N, 3) [m] and those that count (M, 3), and what no cause explains.
-
-    And how much of every cause is left.
-    """
+    """What is off (N, 3), where that counts (M, 3) [m], and what of it no cause explains."""
 
     every: Array
     whole: Array

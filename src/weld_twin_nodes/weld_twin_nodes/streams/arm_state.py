@@ -28,11 +28,7 @@ REMEMBERED = 1000
 
 
 class Moving:
-    """
-    Tells afterwards whether joints moved: at rest nobody knows on which side what they lose is.
-
-    columns: of the joints.
-    """
+    """Tells afterwards whether joints moved: at rest nobody knows on which side their play is."""
 
     def __init__(self, columns: Sequence[int]) -> None:
         self._columns = list(columns)

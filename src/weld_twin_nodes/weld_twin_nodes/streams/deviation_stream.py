@@ -119,12 +119,7 @@ class Pairing:
         return _through(support, stamp)
 
     def _longest(self, high: int) -> int:
-        """
-        Return the longest step up to a pose that is interpolated, by the steps before it.
-
-        The usual step is the longest but two, so that poses may come in bursts and two breaks
-        among those steps do not make a third one usual.
-        """
+        """Return the longest step up to a pose that is interpolated: 4 times the longest but two."""
         stamps = [self._twin[k][0] for k in range(max(high - USUAL, 0), high)]
         steps = sorted(after - before for before, after in pairwise(stamps))
         if not steps:
@@ -190,11 +185,7 @@ class Deviations:
         return len(self._pending)
 
     def take_base(self, rotation: Array | None = None) -> Iterator[Deviation]:
-        """
-        Take the axes of the base in the measuring frame; yield the deviations that waited for them.
-
-        rotation: none for those of the robot: nobody tells them, shape (3, 3).
-        """
+        """Take the base's axes in the measuring frame, if told; yield the deviations that waited."""
         if rotation is not None:
             self._rotation_base_world = rotation.T
         pairs, self._waits = [*self._pending], False

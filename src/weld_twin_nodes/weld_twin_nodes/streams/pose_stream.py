@@ -79,8 +79,7 @@ class PoseStream:
 
     passing: what is refused passes as it came; else nothing is sent.
     shadow: nothing is sent; what would be added is reported.
-    beside: makes exact looks meanwhile; left out, and until it is up, the stream makes them itself
-    after a pose.
+    beside: makes exact looks meanwhile; until it is up, the stream makes them after a pose.
     """
 
     def __init__(
@@ -128,13 +127,9 @@ class PoseStream:
 
     def take(self, pose: Array, now: float, arm: Array | None, withdrawn: str = '') -> Given:
         """
-        Return what becomes of a pose.
+        Return what becomes of a pose of the tool in the robot's base, as the controller counts it.
 
-        pose: of the tool in the robot's base, as the controller counts it, shape (4, 4).
-        now: its stamp [s].
-        arm: joints where the arm stands, shape (n,).
-        withdrawn: why nothing is to be corrected from the next standstill on; empty where there is
-        nothing.
+        withdrawn: why nothing is to be corrected from the next standstill on; empty for nothing.
         """
         if not 0.0 <= now - self._last <= SILENT:
             self.forget()

@@ -125,13 +125,7 @@ class ClockWatch:
         self._history: deque[tuple[float, float]] = deque(maxlen=300)
 
     def look(self, now: float, paired: int, waiting: int, dropped: int) -> str:
-        """
-        Return what to report about the clocks, empty where nothing is.
-
-        now: [s]
-        paired, waiting, dropped: measurements so far that met the twin, that wait for it, and that
-        never will.
-        """
+        """Return what to report about the clocks, by measurements that met the twin, wait, won't."""
         if not (self.measured.alive(now) and self.twin.alive(now)):
             self._begun = None
             return ''
@@ -204,11 +198,7 @@ def _recent(samples: deque[Sample]) -> deque[Sample]:
 
 
 def shift(measured: deque[Sample], twin: deque[Sample]) -> float | None:
-    """
-    Return how far the stamps of a measured way are ahead of the twin's [s].
-
-    None where the two agree, where nothing moves, or where no shift explains their difference.
-    """
+    """Return how far stamps of a measured way are ahead of the twin's [s]; None if none fits."""
     if len(measured) < 2 or len(twin) < 2:
         return None
     epoch = twin[0].stamp
@@ -304,11 +294,7 @@ class StampWatch:
         self._arrivals.append(now)
 
     def look(self) -> Seen:
-        """
-        Return what was seen since the last look.
-
-        The newest steps are judged by what comes after them, unless nothing does.
-        """
+        """Return what was seen since the last look; newest steps wait for those after them."""
         new = len(self._stamps)
         stamps = np.concatenate([self._kept[0], np.array(self._stamps, dtype=np.int64)])
         arrivals = np.concatenate([self._kept[1], np.array(self._arrivals)])
@@ -344,12 +330,7 @@ class StampWatch:
 
 
 def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
-    """
-    Return what steps of stamps show.
-
-    step, passed: between stamps, and between their arrivals, shape (N,) [s].
-    begin, end: of the steps that are judged; the others are there to judge them by.
-    """
+    """Return what steps (N,) [s] of stamps show, those from begin to end judged by all."""
     if begin >= end:
         return Seen()
     beat = step.size >= FEWEST

@@ -43,12 +43,9 @@ class Promise(NamedTuple):
     @classmethod
     def of(cls, remaining: float, unsure: float, samples: int) -> Promise:
         """
-        Return it from what was left on unseen data.
+        Return it from the RMS [m] left on unseen data, and what the model is unsure of [m].
 
-        remaining: RMS distance of measurements from the model [m].
-        unsure: standard deviation, in its worst direction, of what the model is not sure of [m].
-        samples: measurements behind both. What hides in their noise, within two standard errors
-        of its square, may be the model's.
+        What hides in the noise of so many samples, within two standard errors, may be the model's.
         """
         hidden = 2.0 * remaining**2 * sqrt(2.0 / (3.0 * samples))
         rms = hypot(remaining, unsure)

@@ -47,11 +47,7 @@ MOST = 10_000
 
 
 class HeldSignal:
-    """
-    Gives the last sample not after a stamp, as `Signal.at` does over a recording.
-
-    Stamps that are asked for must not go back, but after `hold`.
-    """
+    """Gives the last sample not after a stamp, as `Signal.at`; stamps must not go back."""
 
     def __init__(self) -> None:
         self._samples: deque[tuple[int, Array]] = deque(maxlen=MOST)
@@ -105,8 +101,6 @@ class JointStream:
 
     Wrench and temperature are in force from their own stamp to the next one's. The poses are
     those that the twin gives over the recording of the same messages.
-
-    joint_names: what the joint states call the joints, in the order of the robot.
     """
 
     def __init__(self, twin: Twin, joint_names: tuple[str, ...] | None = None) -> None:
@@ -158,11 +152,7 @@ class JointStream:
         _keep(self._temperature, self.intake.take(Role.TEMPERATURE, message))
 
     def step(self, message: Any) -> Sample | None:
-        """
-        Return the arm at a joint state, None while joints of other publishers are awaited.
-
-        Raises DataError: the message cannot be used; nothing has changed then.
-        """
+        """Return the arm at a joint state, None while joints of other publishers are awaited."""
         taken = self.intake.joint_sample(message)
         if taken is None:
             return None

@@ -80,12 +80,7 @@ def remaining_without(diagnosis: Diagnosis, k: int) -> Remaining | None:
 
 
 def remaining_with(diagnosis: Diagnosis, mended: Collection[int]) -> Remaining:
-    """
-    Return what is left with some of the `switches` thrown, counted from 0.
-
-    The page has these figures from nowhere else, so that one is the same wherever it stands; they are
-    kept as long as the diagnosis is, as many parts of the page ask.
-    """
+    """Return what is left with some of the `switches` thrown, counted from 0; kept."""
     kept = _KEPT.setdefault(diagnosis, {})
     key = tuple(sorted(mended))
     if key not in kept:
@@ -134,11 +129,7 @@ def correctable(diagnosis: Diagnosis) -> bool:
 
 
 def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
-    """
-    Return the share of the squared gap that the curve of a cause without a name takes off.
-
-    None where the cause has a name, or where its curve takes off what its place holds.
-    """
+    """Return the share of the squared gap that the curve of a cause without a name takes off."""
     cause = diagnosis.causes[k]
     remaining = remaining_without(diagnosis, k) if unnamed(cause) else None
     if remaining is None:

@@ -175,11 +175,7 @@ def uncertain(value: float, std: float | None, factor: float = 1.0, unit: str = 
 
 
 def in_short(value: float, std: float | None, factor: float = 1.0, unit: str = '') -> str:
-    """
-    Return '0.0287 ± 0.0003°': three digits of the value, as actions have it.
-
-    The error is rounded to the same place, and never as nothing.
-    """
+    """Return '0.0287 ± 0.0003°': three digits of the value, the error to the same place."""
     value = factor * value
     tail = unit if unit.startswith('°') else f' {unit}' if unit else ''
     places = min(max(_THREE - 1 - floor(log10(abs(value) or 1.0)), 0), 9)
@@ -199,11 +195,7 @@ def _signed(number: str) -> str:
 def short_rows(
     effect: Effect, std: dict[str, Any], robot: Robot | None = None
 ) -> list[tuple[str, str]]:
-    """
-    Return the parameters of an effect as `in_short`; of a vector the axes that count.
-
-    ``std``: standard errors by parameter. ``robot``: tells which joints slide; left out, all turn.
-    """
+    """Return the parameters of an effect as `in_short`; of a vector the axes that count."""
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
     out = []
@@ -243,11 +235,7 @@ def _parts(value: Any, std: Any) -> list[tuple[str, Any, Any]]:
 def parameter_rows(
     effect: Effect, std: dict[str, Any], robot: Robot | None = None
 ) -> list[tuple[str, str]]:
-    """
-    Return name and value of every parameter of an effect; a ripple has a row per order.
-
-    ``effect`` and ``std`` and ``robot``: as for `short_rows`.
-    """
+    """Return name and value of every parameter of an effect; a ripple has a row per order."""
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
     parameters = [p for p in effect.parameters if np.size(getattr(effect, p.name))]

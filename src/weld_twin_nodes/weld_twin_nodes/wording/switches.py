@@ -70,11 +70,7 @@ def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
 
 
 def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """
-    Return what is left, (M, 3), and what each switch adds to it, (S, M, 3), for every recording.
-
-    Without switches what is left is the residual after, and nothing is added to it.
-    """
+    """Return what is left, (M, 3), and what switches add to it, (S, M, 3), by recording."""
     traces, contributions, all_switches = (
         diagnosis.traces,
         diagnosis.contributions,

@@ -178,8 +178,7 @@ def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
     """
     Return the sets of which these data do not tell which it is.
 
-    The set of the largest cause first, and in each the most probable first: so headline, cards and
-    what to do name them alike. What is one error on any motion is no question of the data.
+    The set of the largest cause first, in each the most probable first, wherever named.
     """
     share = share_by_site(diagnosis)
     odds_of = {site: p for each in diagnosis.causes for site, p in each.name}

@@ -29,11 +29,7 @@ def limits(given: Given) -> Limits:
 
 @contextmanager
 def progress(text: str) -> Iterator[tuple[Progress, Callable[..., None]]]:
-    """
-    Yield a bar, and where to tell how many are done of how many.
-
-    It shows on a terminal and leaves other streams alone. ``text``: what stands before it at first.
-    """
+    """Yield a bar, shown on a terminal, and where to tell how many are done of how many."""
     from rich import progress as rich
     from rich.console import Console
 

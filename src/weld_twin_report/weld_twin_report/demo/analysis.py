@@ -164,9 +164,7 @@ def _start(cell: Cell, job: Job) -> Tap:
     """
     Start the nodes; what listens comes before what speaks, and each waits for the next.
 
-    The deviations have three listeners: the recorder, the harness, and the generator, which
-    sends as fast as they come. Measured and twin poses have the analyzer and the recorder, joint
-    states the injector, the twin and the recorder.
+    Deviations go to the recorder, the harness, and the generator, which sends as fast as they come.
     """
     common = {'robot': job.robot.name, 'reliable_inputs': True}
     cell.start('recorder', out=str(job.bag), reliable_inputs=True)

@@ -68,12 +68,7 @@ class Seam:
 
 
 def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: float) -> str:
-    """
-    Return the page.
-
-    ``seams``: as it is, and corrected. ``how``: a key of `WAYS`. ``noise`` [m]: RMS distance
-    that measuring alone makes.
-    """
+    """Return the page of a seam as it is and corrected, where measuring has a noise [m]."""
     before, after = seams
     head = (
         f'The same seam on the same arm: {before.rms * 1e3:.3f} mm off as it is, '

@@ -3,9 +3,7 @@
 """
 The steps of the demo in their order.
 
-A further step is one more entry of `STEPS`: a title and a function that takes the job and a
-function to report progress with; it leaves its files in ``job.folder`` and its words in
-``job.lines``.
+A step more is an entry of `STEPS`: a title and a function of the job, and of what tells progress.
 """
 
 from __future__ import annotations
@@ -83,7 +81,6 @@ def run_demo(out: Path | str, *, closed_loop: bool = False, force: bool = False)
     Run the steps into a directory that appears when all are done.
 
     ``closed_loop``: weld the seam again through the compensator, on an arm without play.
-    ``force``: as `new_directory` takes it.
     """
     console = Console()
     robot = catalog.load(ROBOT)

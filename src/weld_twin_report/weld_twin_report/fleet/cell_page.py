@@ -217,12 +217,7 @@ class Baseline(NamedTuple):
 
 
 def baseline(values: Array, before: int | None = None) -> Baseline | None:
-    """
-    Return what is usual of a value; None where there are too few.
-
-    ``values`` (shape (N,)): in the order of time; what is not finite does not count. ``before``:
-    number of diagnoses before the first change.
-    """
+    """Return what is usual of values in the order of time, up to a number; None for too few."""
     first = values[: min(FIRST, values.size if before is None else before)]
     first = first[np.isfinite(first)]
     if first.size < FEWEST:

@@ -22,11 +22,7 @@ TROUBLES = 50
 
 
 def ranking_page(database: Database, link: Callable[[str], str], ways: Html | None = None) -> str:
-    """
-    Return the page that ranks cells by the gap of their newest diagnosis.
-
-    ``link``: address of the page of a cell. ``ways``: the way to other pages.
-    """
+    """Return the page that ranks cells by the gap of their newest diagnosis."""
     runs = Runs(database)
     newest = runs.newest()
     damaged = [row for row in newest if 'damaged' in row]

@@ -81,11 +81,7 @@ class Listed:
         return words + ['--apply'] * self.apply
 
     def key(self) -> str:
-        """
-        Return what tells this request from any other, content of its files included.
-
-        A file that is not there counts by its name: once it is there, it is another request.
-        """
+        """Return what tells this request from any other, content of files included that are there."""
         files = [self.recording, self.robot, self.effects_known, self.contacts]
         contents = [_content(name) for name in files]
         rest = (self.cell, self.at, self.align, self.base_link, self.tip_link, str(self.apply))
@@ -204,15 +200,7 @@ def run_fleet(
 
 
 class _Writing:
-    """
-    Writes results one by one; what the database cannot take now waits.
-
-    Attributes
-    ----------
-    touched : set of str
-        Cells that have a new diagnosis.
-
-    """
+    """Writes results one by one; what the database cannot take now waits."""
 
     def __init__(self, runs: Runs) -> None:
         self.runs = runs
@@ -263,11 +251,7 @@ def _tasks(
 
 
 class Threads:
-    """
-    Runs tasks that let a process do their work.
-
-    workers: 0 means one for every core.
-    """
+    """Runs tasks that let a process do their work, so many at once; 0 for every core."""
 
     def __init__(self, workers: int = 0) -> None:
         if workers < 0:
@@ -296,11 +280,7 @@ _mine = threading.local()
 
 
 def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, Any]:
-    """
-    Return how a recording went, and its entry.
-
-    ``key``: of the run. ``keep``: directory for what the command wrote; empty to keep nothing.
-    """
+    """Return how a recording went, and its entry; ``keep`` what the command wrote, if anywhere."""
     done, entry = Outcome(-1, '', 0.0), None
     try:
         with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:

@@ -102,20 +102,14 @@ class Database:
         self._engine.dispose()
 
     def add(self, cell: str, entry: Entry) -> bool:
-        """
-        Add a diagnosis to a cell; return whether it was new.
-
-        ``cell``: a new name makes a new cell. Raises DataError: the cell has another robot, or a
-        diagnosis of that instant already.
-        """
+        """Add a diagnosis to a cell, perhaps a new one; return whether it was new."""
         return self.write(lambda connection: self.put(connection, cell, entry)) is not None
 
     def put(self, connection: Connection, cell: str, entry: Entry) -> int | None:
         """
         Add a diagnosis within a transaction; return its number, None if it was there already.
 
-        Raises Refused: as of `add`, and where the recording is there with another date; nothing is
-        written then, if the caller lets it through.
+        Raises Refused, and has written nothing, where it is there with another date, or does not fit.
         """
         sql, verdicts = self.sql, self.table('verdicts')
         number = self._number(connection, cell, entry)
@@ -160,12 +154,7 @@ class Database:
             return [row.name for row in connection.execute(query)]
 
     def entries(self, cell: str, newest: int | None = None) -> list[Entry]:
-        """
-        Return the diagnoses of a cell, in the order of time.
-
-        ``newest``: only so many, the last ones.
-        Raises DataError: there is no such cell. Raises Damaged: one of them cannot be read.
-        """
+        """Return the diagnoses of a cell, in the order of time; raise Damaged where one is."""
         cells, verdicts = self.table('cells'), self.table('verdicts')
         if cell not in (known := self.cells()):
             raise DataError(
@@ -196,10 +185,7 @@ class Database:
         Do some work in one transaction, and return what it returns.
 
         It is done again while others hold the database, or its server is being restarted; so it
-        must change nothing but the database.
-
-        Raises Unavailable: the database could not be used for as long as patience lasts. Raises
-        DataError: it does not take what was written.
+        must change nothing but the database. Raises Unavailable when patience [s] is over.
         """
         remaining = waits(self._patience if patience is None else patience)
         while True:
@@ -250,11 +236,7 @@ def _key(made: Any) -> int:
 
 
 def there_already(row: Any, at: datetime, cell: str) -> bool:
-    """
-    Tell whether a recording is in a cell, by the row that was found of it.
-
-    Raises Refused: it is, with another date, which nobody would notice.
-    """
+    """Tell whether a recording is in a cell, by its row; raise Refused where that has another date."""
     if row is not None and row.at != stored(at):
         raise Refused(
             f'cell {cell!r} has this recording already, of {row.at.isoformat()}, and keeps that date; '

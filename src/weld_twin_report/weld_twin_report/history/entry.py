@@ -85,12 +85,7 @@ def instant(text: str) -> datetime:
 
 
 def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
-    """
-    Return the entry of a diagnosis.
-
-    ``path``: a ``diagnosis.json``, or the directory that holds it. ``at``: when it was recorded;
-    left out, the stamps of the recording tell.
-    """
+    """Return the entry of a diagnosis.json or its directory, recorded as its stamps tell, or ``at``."""
     file = Path(path)
     file = file / 'diagnosis.json' if file.is_dir() else file
     data = read_diagnosis(file)

@@ -68,12 +68,7 @@ def refuse_missing(address: Any, shown: str) -> None:
 
 
 def version_of(connection: Connection, shown: str, *, make: bool) -> int:
-    """
-    Return the version of a history; 0 where an empty database may become one.
-
-    ``shown``: the database, as people may read it. ``make``: whether an empty database may become
-    a history.
-    """
+    """Return the version of a history; 0 where an empty database may become one."""
     import sqlalchemy
 
     there = set(sqlalchemy.inspect(connection).get_table_names())
@@ -104,11 +99,7 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
 
 
 def bring_up(connection: Connection, tables: MetaData, version: int) -> None:
-    """
-    Make the tables, or bring those of an older version to this one.
-
-    ``connection``: in a transaction that writes. ``version``: what `version_of` returned.
-    """
+    """Make the tables in a transaction that writes, or bring those of an older version to this one."""
     import sqlalchemy
 
     tables.create_all(connection)  # those that are not there yet
@@ -158,8 +149,7 @@ def passes(error: Exception, *, connecting: bool = False) -> bool:
     """
     Return whether an error of SQLAlchemy is likely to be gone with the next attempt.
 
-    ``error``: of SQLAlchemy. ``connecting``: whether it comes from the first connection: a server
-    that is not there is then reported at once.
+    A server that is not there at the first connection is reported at once.
     """
     from sqlalchemy.exc import DBAPIError, OperationalError
 

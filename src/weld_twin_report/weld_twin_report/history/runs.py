@@ -47,19 +47,11 @@ class Runs:
 
     def write(self, run: Run, entry: Entry | None, patience: float | None = None) -> Run | None:
         """
-        Write how a recording went, and its diagnosis, in one transaction.
+        Write how a recording went, and its diagnosis, in one transaction; return what was written.
 
-        patience: seconds for which it is tried again; that of the database unless given.
-
-        Raises Unavailable: the database cannot be used now. Nothing was written; it may be tried
-        again.
-
-        Returns
-        -------
-        Run or None
-            What was written: refused where the diagnosis does not fit its cell, failed where the
-            database does not take it. None where it was there; what was written before stays as it is.
-
+        It was refused where the diagnosis does not fit its cell, and failed where the database does not
+        take it. None where it was there: what was written before stays. Raises Unavailable: nothing was
+        written, and may be tried again.
         """
         try:
             return run if self._write(run, entry, patience) else None
@@ -168,11 +160,7 @@ class Runs:
             return [dict(row) for row in connection.execute(query).mappings()]
 
     def look(self, cell: str, entries: Sequence[Entry] | None = None) -> list[dict[str, Any]]:
-        """
-        Return what changed on a cell; worked out once for the diagnoses it has.
-
-        ``entries``: its newest diagnoses, where they are there already.
-        """
+        """Return what changed on a cell; worked out once for the diagnoses it has."""
         sql, findings = self._database.sql, self._database.table('findings')
         number, newest, count = self._state(cell)
         with self._database.reading(f'what changed on cell {cell!r}') as connection:

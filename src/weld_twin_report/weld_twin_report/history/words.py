@@ -26,11 +26,7 @@ DAY = 86_400.0
 
 
 def observations(entries: Sequence[Entry]) -> list[Observation]:
-    """
-    Return entries as observations, the tool counted from that of the first.
-
-    ``entries``: of one cell, in the order of time.
-    """
+    """Return entries, in the order of time, as observations, the tool counted from that of the first."""
     first = entries[0].tool if entries else np.eye(4)
     return [
         Observation(
@@ -66,11 +62,7 @@ def likely(entries: Sequence[Entry]) -> set[str]:
 
 
 def changed(entries: Sequence[Entry], seen: Sequence[Observation]) -> tuple[Change, ...]:
-    """
-    Return what changed on a cell, the surest first.
-
-    ``entries``: of one cell, in the order of time. ``seen``: what `observations` made of them.
-    """
+    """Return what changed on a cell, the surest first."""
     return changes(seen, named=named(entries), likely=likely(entries))
 
 
@@ -187,8 +179,7 @@ def forecast(
     """
     Return when a trend reaches its limit; None where there is no trend or no limit.
 
-    ``seen`` are all diagnoses of the cell, ``result`` is all that changed, ``limits`` are the largest
-    values allowed of effects, in SI units.
+    ``limits``: the largest values allowed of effects, in SI units.
     """
     what = coordinate(change.name)
     if change.kind != 'trend' or what.effect not in limits:

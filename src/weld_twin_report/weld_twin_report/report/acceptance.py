@@ -175,11 +175,7 @@ def _row(name: str, rms: float, most: float, rule: Rule) -> tuple[Html | str, ..
 
 
 def mark(rule: Rule, size: float, before: str = '') -> Html:
-    """
-    Return the verdict on a largest deviation [m]; it follows the field for the tolerance.
-
-    What stands ``before`` it is left out with it where no tolerance is given.
-    """
+    """Return the verdict on a largest deviation [m], and what is ``before`` it, if there is one."""
     verdict = rule.judged(size)
     words = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
     return tag(

@@ -79,11 +79,7 @@ class CauseAnswer:
 
     @cached_property
     def effects(self) -> list[Effect]:
-        """
-        Return the effects in the twin that stand for it.
-
-        Of a cause without a name only curves do: what imitates it says nothing of it.
-        """
+        """Return the effects in the twin that stand for it; of a cause without a name only curves do."""
         result = self.diagnosis.model.found
         effects = [result[m] for m in self.cause.members if m < len(result)]
         return [e for e in effects if e.name in CURVES] if unnamed(self.cause) else effects
@@ -115,8 +111,7 @@ class CauseAnswer:
         """
         Return how sure it is: its name, one of its names that fit alike, or its place.
 
-        Who believes the whole verdict believes each part of it: a part is never reported as less sure.
-        None where nothing is believed of it.
+        A part of the verdict is never reported as less sure than the whole.
         """
         if all(site.effect in CURVES for site, _ in self.cause.name):
             place = self.cause.place

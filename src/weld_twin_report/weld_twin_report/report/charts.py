@@ -91,11 +91,7 @@ def chart(
 
 
 def embedded(data: Any, id_: str | None = None) -> Html:
-    """
-    Return JSON in a page that no name in it can end the script element with.
-
-    What is not finite is null: JSON has no other word for it.
-    """
+    """Return JSON in a page, what is not finite as null, that ends no script element."""
     text = json.dumps(finite(data), separators=(',', ':')).replace('<', '\\u003c')
     return tag('script', Html(text), type='application/json', id_=id_)
 
@@ -108,11 +104,7 @@ def plain(values: Array) -> list[float | None]:
 
 
 def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
-    """
-    Return an index of at most so many samples, the largest of every row among them.
-
-    ``rows`` (shape (N,)): what must keep its peaks; at least one.
-    """
+    """Return an index of at most so many samples, the largest of every row (N,) among them."""
     count = rows[0].size
     if count <= most:
         return np.arange(count)
@@ -141,11 +133,7 @@ _VALUES = {'d': (1e3, 'mm'), 'a': (1e3, 'mm')}
 
 
 def curve_figure(diagnosis: Diagnosis, m: int, curve: JointCurve) -> Html:
-    """
-    Return a figure of a curve over what it runs over; over its angle, the cursor follows the instant.
-
-    ``m``: which of the effects found it is; their covariance makes the band.
-    """
+    """Return a figure of a curve, with a band of one of the effects found, over what it runs over."""
     covariance = _spread(diagnosis, m)
     x, weights, y = _sampled(curve)
     band = np.zeros_like(y)

@@ -111,12 +111,7 @@ def brand_of(robot: str) -> str | None:
 
 
 def correction(effect: Effect, brand: str | None, robot: Robot | None = None) -> str:
-    """
-    Return where this maker's controller takes the correction, or why there is nothing to enter.
-
-    ``brand``: one of `BRANDS`; None where the maker is not known. ``robot``: tells which joints
-    slide; left out, all turn.
-    """
+    """Return where this maker's controller takes the correction, or why there is nothing to enter."""
     kind = effect.traits.entered
     if kind == 'ratio':
         return _RATIO

@@ -84,11 +84,7 @@ def write_results(
     given: GivenUrdf | None = None,
     sheet: Sheet | None = None,  # what the reader wants of the page
 ) -> None:
-    """
-    Write diagnosis.json, the page, the model in every form, and what to measure next.
-
-    Where the data are unsound there is no model: the page and diagnosis.json say what is wrong.
-    """
+    """Write diagnosis.json and the page, and of sound data the model and what to measure next."""
     wanted = diagnosis.next_experiment
     if wanted is not None and wanted.get('motion') is not None:
         file = NEXT if 'contact' not in wanted['motion'] else TOUCHES
@@ -121,8 +117,7 @@ def _candidates(diagnosis: Diagnosis, entries: list[dict[str, Any]]) -> list[dic
     """
     Return the candidates without effects that were asked to be left out.
 
-    Where one of those is the same error as what is named, on any motion, it stands in
-    ``indistinguishable``; then it stays here too, marked as excluded.
+    One that is the same error as what is named, on any motion, stays, marked as excluded.
     """
     tried = set(weighed(diagnosis))
     named = {site for group in diagnosis.indistinguishable for site in group}

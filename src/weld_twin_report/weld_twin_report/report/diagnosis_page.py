@@ -46,11 +46,7 @@ class Sheet:
 def report_page(
     diagnosis: Diagnosis, inputs: Sequence[InputFile] = (), sheet: Sheet | None = None
 ) -> str:
-    """
-    Return the page.
-
-    ``inputs``: what it was made from, as the page lists it.
-    """
+    """Return the page."""
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)
     brand = sheet.brand or brand_of(diagnosis.model.robot.name)
@@ -111,11 +107,10 @@ _PREFIX = re.compile(r'[A-Za-z]{1,3}')
 
 def joint_labels(given: str, joints: Sequence[str]) -> dict[str, str]:
     """
-    Return what each joint is called on the page.
+    Return what each joint is called on the page; empty for the names of the model.
 
     given: a prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML
-    file that gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
-    joints: of the model, in chain order.
+    file that gives a name to joints: ``shoulder_pan_joint: A1``.
     """
     if not given:
         return {}

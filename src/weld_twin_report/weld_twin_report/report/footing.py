@@ -108,8 +108,7 @@ def parts_what(wanted: Mapping[str, Any]) -> str:
     """
     Return what a measurement is to tell apart, in a sentence; nothing where it parts nothing.
 
-    What an explanation without a name depends on is reported only where the two differ in that alone:
-    the curves that stand for it may run over something else than what it was found to depend on.
+    What an explanation without a name depends on is told only where the two differ in that alone.
     """
     one, other = wanted.get('between') or ((), ())
     if not one or not other:

@@ -136,12 +136,7 @@ def lines(texts: Iterable[Child]) -> Html | None:
 def main(
     kind: tuple[str, str], subject: str, headline: str, cells: Html, *sections: Child
 ) -> Html:
-    """
-    Return the frame of a page: what it is of, its headline and figures, and its sections.
-
-    ``kind``: what sort of page it is, the second part in bold. ``subject``: what it is of.
-    ``cells``: the figures.
-    """
+    """Return the frame of a page: what kind, of what, its headline and figures, and its sections."""
     bold = tag('b', kind[1]) if kind[1] else None
     head = tag('header', tag('p.kind', kind[0], bold), tag('p.subject', subject))
     return tag('main', head, tag('section#verdict', tag('h1', headline), cells), *sections)

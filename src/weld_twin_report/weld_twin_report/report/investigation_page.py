@@ -32,11 +32,7 @@ Round = Mapping[str, Any]
 
 
 def investigation_page(state: Mapping[str, Any]) -> str:
-    """
-    Return the page.
-
-    ``state``: the content of investigation.json.
-    """
+    """Return the page of an investigation.json."""
     body = main(
         ('Investigation ', str(state['state'])),
         str(state['robot']),
@@ -193,8 +189,7 @@ def _left(side: Side, against: Side, belief: Mapping[str, Any]) -> bool:
     """
     Return whether an explanation is among what is believed.
 
-    What has nothing of its own is where the other is not; and a curve is not where the formula
-    that it was compared with is.
+    What has nothing of its own is where the other is not; a curve is not where its formula is.
     """
     if not side:
         return not _stands(against, belief)

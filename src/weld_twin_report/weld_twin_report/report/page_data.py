@@ -47,8 +47,7 @@ def squares(diagnosis: Diagnosis) -> list[list[float]]:
     """
     Return the mean products [mm^2] of what is left and what each switch adds, over good samples.
 
-    With ones for what is there and zeros for what is mended, v' S v is the mean square deviation:
-    the page has exact figures though it holds few samples.
+    With ones for what is there and zeros for what is mended, v' S v is the mean square deviation.
     """
     if diagnosis.contacts is not None:
         return [[0.0]]
@@ -143,11 +142,7 @@ SEEN = 5e-4
 
 
 def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
-    """
-    Return what the causes do not hold: what has no name, what is not explained, what is noise.
-
-    What is fitted but not sure enough to be named explains its part, and has no cause to stand on.
-    """
+    """Return what the causes do not hold: what has no name, what is not explained, what is noise."""
     rest = diagnosis.shares
     if any(cause.rest for cause in diagnosis.causes):
         # What is left has a row of its own, with the place where most of it is.
@@ -194,10 +189,7 @@ def components(diagnosis: Diagnosis, k: int, vectors: Array) -> Array | None:
     """
     Return vectors of a recording along the seam, across it and along the tool, (M, 3) [m].
 
-    As the bars of the gap have them: along is the direction of travel, the tool's axis z is made
-    square to it. None for stations at rest, which have no direction of travel.
-
-    ``k``: the recording. ``vectors`` (shape (M, 3) [m]): one at every stamp of its traces.
+    Along is the direction of travel, which stations lack; the tool's axis z is made square to it.
     """
     traces, model = diagnosis.traces, diagnosis.model
     if static(diagnosis, k) or k >= len(diagnosis.recordings) or len(vectors) < 3:

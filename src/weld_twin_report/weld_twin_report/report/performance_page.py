@@ -27,11 +27,7 @@ def performance_page(
     notes: Sequence[str],
     inputs: Sequence[InputFile] = (),
 ) -> str:
-    """
-    Return the page.
-
-    ``robot``: its name. ``notes``: how the frames were had, and what else a reader must know.
-    """
+    """Return the page; notes say how the frames were had."""
     subject = [robot, recording.name, recorded_at([recording])]
     body = main(
         ('Positional accuracy ', 'ISO 9283'),

@@ -58,11 +58,7 @@ _FRAMES = {
 
 
 def old_and_new(effect: RootPose, brand: str, robot: Robot) -> str:
-    """
-    Return old and new value of a positioner's root frame as its controller writes them.
-
-    ``brand``: 'kuka', 'abb' or 'fanuc'.
-    """
+    """Return old and new value of a positioner's root frame as its controller writes them."""
     form = _FRAMES[brand]
     world, begins = world_of(robot, form.language)
     now, new = effect.stands(robot, world)

@@ -73,10 +73,9 @@ F = Callable[[Content], 'Html | None']
 
 def on_page(part: str, place: int, words: Mapping[str, str] | None = None) -> Callable[[F], F]:
     """
-    Return what puts a section on the page; it draws nothing where it returns None.
+    Return what puts a section in its place on the page; it draws nothing where it returns None.
 
     part: one of `PARTS`; 'answer' and 'engineers' are left out where the data are unsound.
-    place: sections of a part stand in the order of this number.
     words: what its heads mean that the glossary has not.
     """
     if part not in PARTS:

@@ -133,11 +133,7 @@ def made_for(wanted: Mapping[str, Any] | None, group: Sequence[Site]) -> bool:
 
 
 def _mending(diagnosis: Diagnosis) -> list[str]:
-    """
-    Return what mends each effect; of those that stand in an open set, under a condition.
-
-    Where mending one alone makes the worst spot worse, that is said beside it.
-    """
+    """Return what mends each effect, and whether it must be this one, or alone makes anything worse."""
     unsure = open_sites(diagnosis)
     causes = cause_by_site(diagnosis)
     out = []

@@ -75,11 +75,7 @@ def advised(parameters: Sequence[dict[str, Any]], most: int) -> list[Advice]:
     """
     Return what gains most, largest gain first.
 
-    Tolerances are independent, so their squares add up: one that is tightened takes its square
-    off the square of the whole.
-
-    ``parameters``: of the local study, with ``contribution_m``: what one tolerance makes, RMS
-    along the seam.
+    Tolerances are independent: one that is tightened takes its square off that of the whole.
     """
     whole = sum(row['contribution_m'] ** 2 for row in parameters)
     out = []

@@ -90,8 +90,7 @@ def run_packed(
     """
     Return what a block of a design's runs comes to, `packed`, and how exact the model is.
 
-    ``drawn`` are narrower tolerances of the same errors that the runs are drawn from: the model of
-    the wider ones holds for them.
+    The model of wider tolerances holds for narrower ones that the runs are ``drawn`` from.
     """
     model = _model(study, tolerances)
     block = _samples(design)[start : start + BLOCK]
@@ -179,8 +178,7 @@ def run_all(
     """
     Return what the runs of every job come to with the largest error of its model, and the pieces.
 
-    ``pieces``: begun first, the longest in front: what is left for the end is short then.
-    ``meanwhile``: what this process does once the workers have their tasks.
+    The pieces are begun first, the longest in front: what is left for the end is short then.
     """
     tasks, owners = list(pieces), []
     for label, (study, tolerances, design, drawn) in jobs.items():

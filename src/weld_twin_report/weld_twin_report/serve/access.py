@@ -56,12 +56,7 @@ class Door(NamedTuple):
 
 
 class Doors:
-    """
-    All connections of a server.
-
-    of_address, of_all: how many may wait for a head, of one address; how many may be open.
-    head: [s]
-    """
+    """All connections of a server: how many may wait for a head, for how long [s], or be open."""
 
     def __init__(
         self, of_address: int = OF_ADDRESS, of_all: int | None = None, head: float = HEAD
@@ -177,8 +172,8 @@ class Access:
     """
     Lets requests through to an application, or refuses them.
 
-    The user's key comes to the application as ``scope['user']``, whether it is a key of this very
-    moment as ``scope['unknown']``, and where the request comes from as ``scope['address']``.
+    ``scope['user']`` is the user's key, ``scope['unknown']`` whether it is of this very moment,
+    and ``scope['address']`` where the request comes from.
     """
 
     def __init__(self, app: Any, settings: Settings, people: People, doors: Doors) -> None:
@@ -364,12 +359,7 @@ SECRET_BYTES = 32
 
 
 class People:
-    """
-    Gives out keys and knows them again.
-
-    directory: of the server; the secret lies there.
-    has: tells whether something is kept of a key: older versions gave keys without a signature.
-    """
+    """Gives out keys and knows them again; older versions gave keys without a signature."""
 
     def __init__(self, directory: Path, has: Callable[[str], bool]) -> None:
         self._secret, self._has = _secret(directory / SECRET), has

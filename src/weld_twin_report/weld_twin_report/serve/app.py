@@ -52,12 +52,7 @@ Said = Callable[[], Mapping[str, str] | None]
 
 
 def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda: None) -> Access:
-    """
-    Return the application.
-
-    ``doors``: notified when requests begin and end. ``live``: returns the last verdict of running
-    nodes.
-    """
+    """Return the application; ``live`` is what running nodes said last."""
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     people = People(settings.directory, queue.has)
     site = _Site(settings, queue, people, live)

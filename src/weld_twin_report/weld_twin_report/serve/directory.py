@@ -37,11 +37,7 @@ _KEY = re.compile(r'[0-9a-f]{32}')
 
 
 class Directory:
-    """
-    A directory in which this server alone works, until `close`.
-
-    path: a link is followed.
-    """
+    """A directory, perhaps behind a link, in which this server alone works, until `close`."""
 
     def __init__(self, path: Path) -> None:
         self.path = followed(path)
@@ -156,11 +152,7 @@ def is_full(error: BaseException) -> bool:
 
 
 def refuse_full(directory: Path, length: int) -> None:
-    """
-    Refuse an upload that the disk has no room for.
-
-    Raises NoRoom: there is none.
-    """
+    """Refuse an upload that the disk has no room for, by NoRoom."""
     if shutil.disk_usage(directory).free < length + min(SPARE, _tenth(directory)):
         raise NoRoom(NO_ROOM)
 
@@ -185,12 +177,7 @@ def giving_way(
     jobs: Sequence[Job], sizes: Mapping[str, int], new: Job, allowed: int, most: int
 ) -> list[Job]:
     """
-    Return the finished jobs that go, so that a new one can be kept.
-
-    jobs: all but the new one.
-    sizes: bytes by the key of each, the new one too.
-    allowed: bytes of all.
-    most: jobs of all.
+    Return the finished jobs that go, so that a new one can be kept, in bytes and number.
 
     Raises NoRoom: nobody has more than a fair share, and it is too much all the same.
     """

@@ -230,8 +230,7 @@ def sentence(text: str, command: str = '') -> str:
     """
     Return what a command says as somebody without a command line reads it.
 
-    ``command``: the one that says it, where two fields are called alike; empty for those of a
-    recording.
+    ``command``: the one that says it, where two fields are called alike.
     """
     titles = {
         (field.option or name).replace('_', '-'): field.title

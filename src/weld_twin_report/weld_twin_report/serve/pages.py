@@ -183,12 +183,7 @@ def recordings_page(jobs: Sequence[Job], site: Site) -> str:
 def job_page(
     job: Job, ahead: int, diagnosis: Mapping[str, Any] | None, files: Sequence[str], site: Site
 ) -> str:
-    """
-    Return the page of a recording or program: its place, its progress, its question or its sheet.
-
-    So many come ahead of it; ``diagnosis`` is its diagnosis.json, where there is one, and ``files`` may
-    be fetched.
-    """
+    """Return the page of a recording or program: its place, its progress, its question or its sheet."""
     if job.state in OPEN:
         return page('in work', _progress(job, ahead), refresh=REFRESH, site=site)
     if job.state == DONE:
@@ -296,10 +291,9 @@ def _ask_again(job: Job) -> Html:
 
 def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> str:
     """
-    Return the page on which a program is dropped.
+    Return the page on which a program is dropped, and what was said when it was refused.
 
-    Any of the user's jobs that has a diagnosis may correct it; ``of`` is the key of the one that is
-    chosen first. What was said when it was refused before stands above.
+    Any of the user's jobs that has a diagnosis may correct it; ``of`` is the one chosen first.
     """
     models = _models(jobs)
     robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in robot_names())]

@@ -104,11 +104,7 @@ class Queue:
         return mine or self.user_folder(user).is_dir()
 
     def check_room(self, job: Job) -> None:
-        """
-        Refuse a job more where too many wait.
-
-        Raises Full: too many of this user, of the new ones of his address, or of all.
-        """
+        """Refuse, by Full, a job more of a user, or new ones of his address, or of all."""
         with self._news:
             self._check_room(job)
 
@@ -129,12 +125,7 @@ class Queue:
             raise Full('too many recordings wait; try again later')
 
     def add(self, job: Job) -> None:
-        """
-        Take a new job whose files are in its folder; it waits from now on.
-
-        Raises Full, NoRoom: too many wait, or too much is kept. Raises OSError: it cannot be
-        written.
-        """
+        """Take a new job whose files are in its folder; raise Full, NoRoom or OSError."""
         size, allowed = size_of(self.folder(job)), self._settings.disk
         with self._news:
             self._check_room(job)

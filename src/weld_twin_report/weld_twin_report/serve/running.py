@@ -63,12 +63,7 @@ SCRATCH = 'scratch'
 
 
 def serve(settings: Settings, tell: Callable[[str], None]) -> None:
-    """
-    Serve until it is interrupted.
-
-    ``tell``: called with the address once the server listens. Raises DataError: what it needs is not
-    installed, or the port is taken.
-    """
+    """Serve until it is interrupted; tell the address once the server listens."""
     try:
         import uvicorn
 

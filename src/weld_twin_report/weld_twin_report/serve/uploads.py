@@ -57,14 +57,7 @@ class Busy(Exception):
 
 
 class Body:
-    """
-    The body of one request, read through `receive`.
-
-    party: who sends it.
-    receive: what the server hands out.
-    most: bytes allowed.
-    length: bytes announced; None for what is no number.
-    """
+    """The body of one request, of so many bytes as were announced and allowed, as it comes in."""
 
     def __init__(
         self, bodies: Bodies, party: str, receive: Receive, most: int, length: int | None
@@ -75,11 +68,7 @@ class Body:
         self.whole = False
 
     async def receive(self) -> dict[str, Any]:
-        """
-        Return the next message.
-
-        Raises TooMuch, TooSlow, Busy.
-        """
+        """Return the next message, or raise TooMuch, TooSlow or Busy."""
         if self._length is None or self._length > self._most:
             raise TooMuch
         await self._bodies.enter(self)
@@ -122,11 +111,7 @@ class Body:
 
 
 class Bodies:
-    """
-    All bodies that are being read.
-
-    of_party, of_all: how many are read at the same time, of one party and of all.
-    """
+    """All bodies that are being read, and how many may be, of one party and of all."""
 
     def __init__(self, of_party: int = OF_PARTY, of_all: int = OF_ALL) -> None:
         self._of_party, self._of_all = of_party, of_all
@@ -214,12 +199,7 @@ class Upload(Protocol):
 
 
 async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, ...]:
-    """
-    Write the files of a recording into a new folder of their title, and return their names.
-
-    ``most``: files allowed. Raises DataError: there are none, too many, or one is of no kind that
-    is read.
-    """
+    """Write the files of a recording into a new folder of their title, and return their names."""
     names = _names(uploads, BAGS + TABLES + OTHERS, 'a bag, a table nor a robot file', most)
     if not names:
         raise DataError('choose a recording first: a bag, or a table of angles and positions')
@@ -234,12 +214,7 @@ async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, 
 async def save_program(
     uploads: Sequence[Upload], model: Sequence[Upload], place: Path, beside: Path
 ) -> tuple[str, ...]:
-    """
-    Write a program, and what it is corrected by, and return the names of the program's files.
-
-    ``model``: a ``diagnosis.json``, and a robot file; none where a recording's are taken.
-    ``place`` and ``beside``: for the program, in a new folder of its title; for the model.
-    """
+    """Write a program in a folder, what it is corrected by ``beside``; return the program's names."""
     names = _names(uploads, PROGRAMS, 'a program nor a file that belongs to one', 8)
     if not names:
         raise DataError('choose a program first')
@@ -292,11 +267,7 @@ def _name(given: str | None, suffixes: tuple[str, ...], kind: str) -> str:
 
 
 def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
-    """
-    Return what a form asks of a recording; its robot is empty where none was chosen.
-
-    ``names``: of the files dropped. Raises DataError: a field holds something that is no choice.
-    """
+    """Return what a form asks of a recording; its robot is empty where none was chosen."""
     options = given(_texts(form), (IMPORT, DIAGNOSE))
     tables = [name for name in names if name.lower().endswith(TABLES)]
     if 'joint_signs' in options and not tables:
@@ -311,12 +282,7 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 
 
 def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
-    """
-    Return what a form asks of a program.
-
-    ``names``: of the files of its model. Raises DataError: a field holds something that is no
-    choice.
-    """
+    """Return what a form asks of a program and its model."""
     return Asked(_robot(form, names), told=given(_texts(form), (CORRECT,)))
 
 

@@ -201,11 +201,7 @@ def _share(own: int, total: int, most: int) -> int:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """
-    Yield where to tell progress; it shows on a terminal and leaves other streams alone.
-
-    A program that shows it elsewhere asks for lines.
-    """
+    """Yield where to tell progress: on a terminal, or by lines to a program that asks for them."""
     if os.environ.get(LINES) == 'lines':
         yield lambda text: print(text, file=sys.stderr, flush=True)
         return

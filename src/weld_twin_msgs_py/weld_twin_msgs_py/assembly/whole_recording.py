@@ -207,7 +207,6 @@ def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | N
 def _measurements(
     streams: Mapping[Role, Samples], epoch: int
 ) -> tuple[Measurements | None, tuple[str, ...]]:
-    """Return what was measured, and what is to be said of it."""
     noise, said = None, tuple[str, ...]()
     if Role.POSE in streams:
         ns, rows = streams[Role.POSE]

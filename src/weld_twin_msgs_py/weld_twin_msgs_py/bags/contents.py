@@ -22,8 +22,6 @@ from .reader import BagReader
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """One topic of a bag."""
-
     name: str
     type: str
     count: int

@@ -66,7 +66,6 @@ class GrowingBag:
         self._lock = -1
 
     def open(self) -> GrowingBag:
-        """Start the bag."""
         self._refuse_existing()
         with clear_write_errors(self.path):
             self.folder.mkdir(parents=True)

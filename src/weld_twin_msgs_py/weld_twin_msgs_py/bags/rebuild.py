@@ -225,8 +225,6 @@ _SCRATCH = '.recovering'
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was recovered."""
-
     source: Path
     path: Path
     """Where from, and the new bag."""

@@ -94,7 +94,6 @@ class Stream:
         )
 
     def samples(self) -> Samples:
-        """Return the samples."""
         if not len(self):
             for _, sentence in self._other.values():
                 raise DataError(sentence)

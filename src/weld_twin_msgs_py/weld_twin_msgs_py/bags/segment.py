@@ -70,7 +70,6 @@ class _McapWriter(McapWriter):
     """Writes the hash of the type beside the quality of service, as rosbag2 does."""
 
     def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
-        """Add a connection."""
         metadata = BytesIO()
         for text in (OFFERED, offered_qos_profiles, TYPE_HASH, connection.digest):
             write_string(metadata, text)
@@ -125,7 +124,6 @@ class Segment:
 
     @property
     def file(self) -> Path:
-        """Return the storage file."""
         return next(file for file in self.folder.iterdir() if file.suffix in SUFFIXES)
 
     def announce(self, channel: Channel) -> Connection:

@@ -49,7 +49,6 @@ class BagWriter:
         self._segment: Segment | None = None
 
     def open(self) -> BagWriter:
-        """Start the bag."""
         self._refuse_existing()
         with self._clear_errors():
             self._scratch = Scratch(self.path.parent, f'.{self.path.name}-')
@@ -110,7 +109,6 @@ class BagWriter:
         self._scratch = None
 
     def __enter__(self) -> BagWriter:
-        """Start the bag."""
         return self.open()
 
     def __exit__(

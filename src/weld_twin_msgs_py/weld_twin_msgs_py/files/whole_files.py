@@ -85,7 +85,6 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Return the text of a result."""
     return json.dumps(plain(value), indent=1, allow_nan=False) + '\n'
 
 

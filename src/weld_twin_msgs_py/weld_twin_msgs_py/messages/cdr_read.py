@@ -137,7 +137,6 @@ class JointStateDecoder:
         self._known: dict[bytes, _Kept] = {}
 
     def __call__(self, data: bytes) -> JointState:
-        """Return the joint state."""
         for head, (frame, name, body, at, end, moving) in self._known.items():
             if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)

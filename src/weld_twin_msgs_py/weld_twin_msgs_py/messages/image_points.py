@@ -37,7 +37,6 @@ def label(tag: int, corner: int) -> str:
 
 
 def corners(message: Any) -> Marks:
-    """Return the corners of all tags in a message."""
     out: Marks = []
     for result in message.detections:
         if len(result.corners) != len(OURS):

@@ -29,8 +29,6 @@ Astray = Callable[[Controller], Callable[[Array, Array], tuple[int, ...]]]
 
 
 class Point(NamedTuple):
-    """A point of a program."""
-
     name: str
     """As the program calls it; 'line 12' for one that stands in the move."""
     where: str
@@ -81,8 +79,6 @@ class Step:
 
 @dataclass(eq=False)
 class Program:
-    """A program that was read."""
-
     language: str
     sources: list[Source]
     """The first is the program, the others belong to it."""

@@ -41,8 +41,6 @@ ARM = 6
 
 
 class ExternalAxis(NamedTuple):
-    """One external axis."""
-
     label: str
     """As the controller calls it."""
     joint: int

@@ -35,8 +35,6 @@ from .urscript import UrscriptReader
 
 
 class Language(NamedTuple):
-    """One language."""
-
     maker: str
     extensions: tuple[str, ...]
     """In lower case, with the point."""

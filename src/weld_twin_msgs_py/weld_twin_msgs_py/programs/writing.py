@@ -46,8 +46,6 @@ class ExportMove(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """A program to write."""
-
     name: str
     """Letters, digits and underscores, as all controllers take it."""
     moves: tuple[ExportMove, ...]
@@ -173,7 +171,6 @@ UR_ACCELERATION = (0.5, 0.3)
 
 
 def written(program: Exported, language: str) -> str:
-    """Return the text of a program."""
     return WRITERS[language](program)
 
 

@@ -88,12 +88,10 @@ class Tree(NamedTuple):
         return [name for name in self.links if name not in parents]
 
     def below(self, link: str) -> list[Joint]:
-        """Return the joints that hang on a link."""
         return [joint for joint in self.above.values() if joint.parent == link]
 
 
 def read_tree(path: Path | str) -> Tree:
-    """Read a URDF."""
     return parse_tree(read_text(path, 'URDF'), path)
 
 

@@ -54,7 +54,6 @@ class Given(argparse.Namespace):
         return [link or None for link in (self.base_link, self.tip_link, self.flange_link)]
 
     def load_robot(self) -> Robot:
-        """Return the robot that is named."""
         from weld_twin_msgs_py.robots import load_robot
 
         return load_robot(self.robot, *self.links)
@@ -68,7 +67,6 @@ class Given(argparse.Namespace):
         return GivenUrdf(path, *self.links) if path.suffix.lower() in URDF_SUFFIXES else None
 
     def read_cameras(self) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
-        """Return the cameras and targets that are described."""
         from ..offline.given_twin import given_cameras
 
         return given_cameras(self.camera, self.target)
@@ -124,7 +122,6 @@ class Given(argparse.Namespace):
             write_json(place / mark, entry)
 
     def say_page(self) -> None:
-        """Print where the page is."""
         print(f'report: {Path(self.out) / PAGE}')
 
     def output_file(self) -> AbstractContextManager[Path]:

@@ -249,7 +249,6 @@ class Compensator(ManagedNode):
     # What is known ---------------------------------------------------------------------------
 
     def intakes(self) -> Sequence[Intake]:
-        """Return what takes its messages in."""
         return (self._intake,)
 
     def _on_wrench(self, message: Any) -> None:

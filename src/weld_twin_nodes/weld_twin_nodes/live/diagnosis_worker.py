@@ -108,7 +108,6 @@ class Worker:
 
 
 def find(job: Job) -> Finding:
-    """Return the finding of a job."""
     from weld_twin_core.diagnosis import diagnose
     from weld_twin_msgs_py.bags.images import looking
 

@@ -255,7 +255,6 @@ class LiveDiagnosis(ManagedNode):
         super().destroy_node()
 
     def intakes(self) -> Sequence[Intake]:
-        """Return what takes its messages in."""
         return (self._window.intake,)
 
     def _take(self, role: Role, message: Any) -> None:

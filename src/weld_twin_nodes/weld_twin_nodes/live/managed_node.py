@@ -84,7 +84,6 @@ class Later:
             send(self._answer)
 
     def answer(self, response: Any) -> None:
-        """Give the answer."""
         self._answer = response
         if self._send is not None:
             self._send(response)

@@ -61,7 +61,6 @@ class ModelNode(CellNode):
             self.publish(sample)
 
     def intakes(self) -> Sequence[Intake]:
-        """Return what takes its messages in."""
         self._input.others = self.stream.passed_over
         return (self.stream.intake,)
 

@@ -150,7 +150,6 @@ class TellingNode(Node):
         """Look at the inputs before their health is reported."""
 
     def tell_health(self) -> None:
-        """Tell of the node and its inputs."""
         self.look()
         self._look_at_losses()
         self._look_at_old_values()

@@ -121,7 +121,6 @@ class MeasuredInputs:
                 self._waiting.popleft()
 
     def _in_measuring_frame(self, message: Any) -> Any:
-        """Return a measurement in the measuring frame."""
         assert self._tree is not None
         frame, stamp = message.header.frame_id.strip('/'), from_messages.stamp_ns(message)
         try:

@@ -102,7 +102,6 @@ class Book:
         self._words: dict[tuple[str, str], deque[Word]] = {}
 
     def take(self, each: Word) -> None:
-        """Take a word."""
         self._words.setdefault((each.node, each.run), deque(maxlen=2)).append(each)
 
     def last(self) -> Iterator[Word]:

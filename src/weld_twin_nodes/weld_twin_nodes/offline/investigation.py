@@ -219,7 +219,6 @@ def begin(robot: str, options: Sequence[str], budget: float) -> State:
 
 
 def read_state(directory: Path) -> State:
-    """Return the state of an investigation."""
     content = read_json(directory / STATE)
     if content.get('schema') != SCHEMA:
         raise DataError(f"'{directory / STATE}' is no investigation")

@@ -97,7 +97,6 @@ def listed(folder: Path) -> dict[str, Digests]:
 
 
 def write_list(folder: Path, results: Mapping[str, Mapping[str, str]]) -> None:
-    """Write a list into a folder."""
     content = {'schema': SCHEMA, 'about': _ABOUT, 'results': results}
     write_text(folder / LIST, json.dumps(content, indent=1) + '\n', overwrite=True)
 

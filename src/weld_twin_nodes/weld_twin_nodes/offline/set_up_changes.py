@@ -38,7 +38,6 @@ class SetUpChange:
     mass in the tool frame [m]."""
 
     def __str__(self) -> str:
-        """Return it as `set_up_change` reads it."""
         return '='.join(filter(None, (self.kind, ','.join(f'{n:g}' for n in self.numbers))))
 
 

@@ -148,7 +148,6 @@ class JointStream:
         _keep(self._wrench, self.intake.take(Role.WRENCH, message))
 
     def take_temperature(self, message: Any) -> None:
-        """Take the temperature."""
         _keep(self._temperature, self.intake.take(Role.TEMPERATURE, message))
 
     def step(self, message: Any) -> Sample | None:

@@ -205,7 +205,6 @@ class _ByGoals:
         cell.wait(lambda: len(measured) > 0, 'the tool to be measured')
 
     def run(self, goal: Goal, corrected: bool) -> None:
-        """Run a goal to its end."""
         message = self.kind.Goal()
         message.trajectory.joint_names = list(self.job.robot.joint_names)
         message.trajectory.points = self.cell.messages.trajectory_points(*goal)

@@ -97,7 +97,6 @@ def _content(name: str) -> str:
 
 
 def read_list(path: Path | str) -> list[Listed]:
-    """Return the lines of a list."""
     file = Path(path)
     names = [field.name for field in fields(Listed)]
     try:

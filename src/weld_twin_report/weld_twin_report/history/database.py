@@ -147,7 +147,6 @@ class Database:
         return sqlite.insert(table) if lite else postgresql.insert(table)
 
     def cells(self) -> list[str]:
-        """Return the names of all cells."""
         cells = self.table('cells')
         with self.reading() as connection:
             query = self.sql.select(cells.c.name).order_by(cells.c.name)
@@ -171,7 +170,6 @@ class Database:
             return [_entry(row) for row in connection.execute(query)][::-1]
 
     def table(self, name: str) -> Any:
-        """Return a table of the schema."""
         return self._tables.tables[name]
 
     def write(

@@ -30,8 +30,6 @@ PASSING = 'base '
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One diagnosis."""
-
     at: datetime  # when it was recorded, UTC
     robot: str
     kinematics: str
@@ -143,7 +141,6 @@ def _impossible(value: Array, prior: Array, covariance: Array) -> str:
 
 
 def date_of_stamp(epoch_ns: int, file: Path) -> datetime:
-    """Return the date of a stamp [ns]."""
     at = datetime.fromtimestamp(epoch_ns // NANOSECONDS, timezone.utc)
     if at.year < FIRST_YEAR:
         raise DataError(

@@ -61,7 +61,6 @@ def not_a_cell(name: str) -> str:
 
 
 def schema() -> MetaData:
-    """Return the tables."""
     import sqlalchemy as sql
 
     tables = sql.MetaData()

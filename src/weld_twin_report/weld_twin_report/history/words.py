@@ -142,7 +142,6 @@ def coordinate(name: str) -> Coordinate:
 
 
 def date(day: float) -> str:
-    """Return a day as a date."""
     return datetime.fromtimestamp(day * DAY, timezone.utc).date().isoformat()
 
 

@@ -178,7 +178,6 @@ class Answer:
 
     @property
     def status(self) -> str:
-        """Return the status in words."""
         return status_word(self.diagnosis)
 
     @cached_property
@@ -193,12 +192,10 @@ class Answer:
 
     @cached_property
     def to_do(self) -> list[str]:
-        """Return what to do, in this order."""
         return worth_doing(self.diagnosis, self.rule)
 
     @cached_property
     def causes(self) -> tuple[CauseAnswer, ...]:
-        """Return what is said of each cause."""
         count = len(self.diagnosis.causes)
         return tuple(CauseAnswer(self.diagnosis, k, self.brand) for k in range(count))
 

@@ -60,20 +60,16 @@ _SENTENCE = re.compile(r'(?<=\.) (?=[A-Z])')
 
 @dataclass(frozen=True, eq=False)
 class CauseAnswer:
-    """What is said of one cause."""
-
     diagnosis: Diagnosis
     k: int  # the cause, counted from 0
     brand: str | None = None  # whose controller it is, as `controllers.BRANDS` has it
 
     @cached_property
     def cause(self) -> Cause:
-        """Return what is known of it."""
         return self.diagnosis.causes[self.k]
 
     @cached_property
     def name(self) -> str:
-        """Return it as a heading."""
         heading = cause_name(self.diagnosis, self.cause)
         return f'{heading[:1].upper()}{heading[1:]}'
 

@@ -35,8 +35,6 @@ _DIGITS = 5
 
 
 class Line(NamedTuple):
-    """One line of a chart."""
-
     name: str  # as the legend has it
     values: Array  # shape (N,), in the unit of the chart; what is not finite leaves a gap
     colour: str = 'after'

@@ -28,7 +28,6 @@ ROWS = 500
 
 
 def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) -> str:
-    """Return the page of a correction.json."""
     title = f'{entry["program"]} · {entry["robot"]}'
     tolerance = tolerance_sentences(entry)
     body = main(

@@ -46,7 +46,6 @@ class Sheet:
 def report_page(
     diagnosis: Diagnosis, inputs: Sequence[InputFile] = (), sheet: Sheet | None = None
 ) -> str:
-    """Return the page."""
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)
     brand = sheet.brand or brand_of(diagnosis.model.robot.name)

@@ -32,7 +32,6 @@ Round = Mapping[str, Any]
 
 
 def investigation_page(state: Mapping[str, Any]) -> str:
-    """Return the page of an investigation.json."""
     body = main(
         ('Investigation ', str(state['state'])),
         str(state['robot']),

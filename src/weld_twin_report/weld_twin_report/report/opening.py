@@ -67,7 +67,6 @@ WORDS = {
 
 
 def header(answer: Answer) -> Html:
-    """Return what was diagnosed."""
     kind = tag('p.kind', 'Positional accuracy ', tag('b', 'diagnosis'))
     return tag('header', kind, tag('p.subject', answer.subject))
 

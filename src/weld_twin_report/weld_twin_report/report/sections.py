@@ -52,7 +52,6 @@ class Content:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """Return the diagnosis that the answer is of."""
         return self.answer.diagnosis
 
 

@@ -61,7 +61,6 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
 
 
 def _print_data(diagnosis: Diagnosis, console: Console) -> None:
-    """Print what is to be said of the data."""
     for check in diagnosis.checks:
         if check.level == 'warning':
             console.print(f'[yellow]data:[/] {escape(check.sentence)}')

@@ -365,7 +365,6 @@ class People:
         self._secret, self._has = _secret(directory / SECRET), has
 
     def new(self) -> str:
-        """Return a new key."""
         chance = secrets.token_hex((LENGTH - DATE - SIGNATURE) // 2)
         head = f'{int(time.time()):0{DATE}x}{chance}'
         return head + self._signature(head)

@@ -26,8 +26,6 @@ Check = Callable[[str], str]
 
 
 class Field(NamedTuple):
-    """One field."""
-
     title: str
     hint: str = ''
     check: Check | None = None  # not needed for choices

@@ -57,7 +57,6 @@ class Site(NamedTuple):
     live: bool = False  # the verdict of running nodes
 
     def ways(self) -> Html:
-        """Return the way to all pages."""
         links = [
             ('/', 'New recording'),
             ('/program', 'Correct a program'),

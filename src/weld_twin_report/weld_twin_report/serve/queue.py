@@ -90,7 +90,6 @@ class Queue:
         return out
 
     def folder(self, job: Job) -> Path:
-        """Return the folder of a job."""
         return self._directory.jobs / job.key
 
     def user_folder(self, user: str) -> Path:

@@ -15,8 +15,6 @@ LOOPBACK = ('localhost', '127.0.0.1', '::1')
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a server."""
-
     directory: Path  # where uploads and results lie
     host: str = 'localhost'
     port: int = 8765  # 0 for any that is free

@@ -9,7 +9,6 @@ from weld_twin_nodes.cli.given import Given
 
 
 def run(given: Given) -> int:
-    """Run the demo."""
     try:
         import rclpy  # noqa: F401
     except ImportError:

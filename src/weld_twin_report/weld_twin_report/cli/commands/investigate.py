@@ -134,7 +134,6 @@ def _more(given: Given, robot: Robot, tolerance: float) -> Planned:
 
 
 def _in_region(given: Given, robot: Robot) -> tuple[Array, Array]:
-    """Return the postures of --region."""
     from weld_twin_msgs_py.programs.languages import language_of
     from weld_twin_msgs_py.programs.source import read_source
     from weld_twin_nodes.offline.region import region

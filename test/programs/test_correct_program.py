@@ -75,6 +75,20 @@ def told(robot, tool, moves):
     ]
 
 
+REMARKS = {
+    'krl': ['; {}\r\nEND\r\n', '; {}\r\nENDDAT\r\n'],
+    'rapid': ['! {}\nENDMODULE\n'],
+    'inform': ["'{}\r\nEND\r\n"],
+    'fanuc-ls': ['  14:  !{} ;\n/POS\n'],
+}
+"""How a corrected file says so, with what stands behind it: where controllers take remarks."""
+
+
+def without_remark(text):
+    """Return a corrected file without the line that says so."""
+    return readers.re.sub(r'[^\n]*corrected by weld_twin[^\n]*\n', '', text)
+
+
 @pytest.mark.parametrize('language', CELLS)
 def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
     robot, files, _, _ = CELLS[language]
@@ -131,11 +145,24 @@ def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(langu
     assert errors[1][led].max() < ROUNDING.get(language, 4e-6)
     expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
     assert expected['after']['rms_m'] < 0.05 * expected['before']['rms_m']
-    for pair in zip(texts(MADE, files), texts(tmp_path / 'out', files), strict=True):
+    written = [without_remark(text) for text in texts(tmp_path / 'out', files)]
+    for pair in zip(texts(MADE, files), written, strict=True):
         old, new = (''.join(readers.re.split(readers.NUMBER, text)) for text in pair)
         assert old == new
         old, new = (readers.re.findall(r'(?:;|!|#)[^\n]*', text) for text in pair)
         assert old == new
+    remarks = REMARKS.get(language, ['# {}\n'])
+    for text, remark in zip(texts(tmp_path / 'out', files), remarks, strict=True):
+        assert remark.format('corrected by weld_twin') in text
+    # On another machine, with nothing near that tells where it comes from, it is refused by it.
+    (tmp_path / 'elsewhere').mkdir()
+    for file in files:
+        (tmp_path / 'out' / file).rename(tmp_path / 'elsewhere' / file)
+    said = weld_twin(
+        *('correct', tmp_path / 'elsewhere' / files[0], '--robot', name, '--out', tmp_path / 'b'),
+        *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
+    )
+    assert said.code == 2 and 'was corrected already' in said.err and not (tmp_path / 'b').exists()
 
 
 def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-4):

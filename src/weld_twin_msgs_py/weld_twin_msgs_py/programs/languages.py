@@ -47,6 +47,10 @@ class Language(NamedTuple):
     """Extensions of files that belong to a program and lie beside it."""
     last: tuple[str, ...] = ()
     """Words of which one is the last line that says something; none where a program has no end."""
+    remark: str = '# {}'
+    """How it writes a remark, with {number} where it numbers its lines."""
+    before: str = r'\Z'
+    """A regular expression of the line before which one may stand, behind all moves."""
 
 
 LANGUAGES: dict[str, Language] = {
@@ -61,12 +65,30 @@ LANGUAGES: dict[str, Language] = {
         KUKA_POSE,
         ('.dat',),
         ('END', 'ENDFCT'),
+        '; {}',
+        r'^[ \t]*END(?:FCT|DAT)?\s*\Z',
     ),
     'inform': Language(
-        'Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE, last=('END',)
+        'Yaskawa',
+        ('.jbi',),
+        r'(?m)^/JOB\b',
+        InformReader,
+        YASKAWA_POSE,
+        (),
+        ('END',),
+        "'{}",
+        r'^[ \t]*END\s*\Z',
     ),
     'fanuc-ls': Language(
-        'FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE, last=('/END',)
+        'FANUC',
+        ('.ls',),
+        r'(?m)^/PROG\b',
+        FanucReader,
+        FANUC_POSE,
+        (),
+        ('/END',),
+        '{number:4d}:  !{} ;',
+        r'^/POS\b',
     ),
     'joint-trajectory': Language(
         'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', TrajectoryReader, CSV_POSE
@@ -78,7 +100,10 @@ LANGUAGES: dict[str, Language] = {
         r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
         RapidReader,
         ABB_POSE,
-        last=('ENDMODULE',),
+        (),
+        ('ENDMODULE',),
+        '! {}',
+        r'^[ \t]*ENDMODULE\s*\Z',
     ),
 }
 """By the names that ``--controller`` takes."""
@@ -128,6 +153,48 @@ def _refuse_cut(source: Source, language: Language) -> None:
             f'{source.where(len(source.text.rstrip()) - 1)}: the program does not end with '
             f'{language.last[0]}; is the file cut off?'
         )
+
+
+MARK = 'corrected by weld_twin'
+"""Remark of a file whose points a correction moved: a FANUC has room for 32 letters."""
+_END = '\x1a \t\r\n'
+_COUNT = re.compile(r'^(LINE_COUNT[ \t]*=[ \t]*)\d+', re.M)
+"""Of the numbered lines of a FANUC program."""
+
+
+def marked(source: Source, name: str) -> Source:
+    """Return a file that a correction changed, with the remark; JSON knows none, and stays."""
+    text, language = source.text, LANGUAGES[name]
+    if text.lstrip().startswith('{'):
+        return source
+    said = masked(text, language.reader.comments).rstrip(_END)
+    found = re.search(language.before, said, re.I | re.M)
+    place = found.start() if found and found[0] else len(text.rstrip('\x1a'))
+    head, rest = text[:place], text[place:]
+    end = '\r\n' if '\r\n' in text else '\n'
+    number = int((re.findall(r'^[ \t]*(\d+):', head, re.M) or ['0'])[-1]) + 1
+    if name == 'fanuc-ls':
+        head = _COUNT.sub(rf'\g<1>{number}', head)
+    gap = '' if head.endswith('\n') else end
+    return Source(
+        source.name, head + gap + language.remark.format(MARK, number=number) + end + rest
+    )
+
+
+def refuse_marked(sources: Sequence[Source]) -> None:
+    """Refuse a program with a file whose points a correction moved, wherever it comes from."""
+    for source in sources:
+        place = source.text.lower().find(MARK)
+        if place >= 0:
+            raise corrected_twice(source.name, f'{source.where(place)} says so')
+
+
+def corrected_twice(name: str, why: str) -> DataError:
+    """Return that a program was corrected already, and how that is known."""
+    return DataError(
+        f"'{name}' was corrected already: {why}; give the program as it was before, or its points "
+        'are moved twice'
+    )
 
 
 def read_sources(sources: Sequence[Source], context: Context, name: str) -> Program:

@@ -41,6 +41,7 @@ from weld_twin_msgs_py.programs import (
     rewritten,
     to_moves,
 )
+from weld_twin_msgs_py.programs.languages import marked, refuse_marked
 from weld_twin_msgs_py.programs.source import Source
 from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
 
@@ -126,6 +127,7 @@ def corrected_program(
 ) -> CorrectedProgram:
     """Return a program corrected so that the real tool goes where it means."""
     name = program.sources[0].name
+    refuse_marked(program.sources)
     if readings:
         where = [f'{p.where}: {p.name} holds' for p in program.points if p.value.ndim == 1]
         where += [] if start is None else ['--start holds']
@@ -164,11 +166,12 @@ def _read_back(
     """Return the texts of a program with other points, and the points as they read there."""
     texts = rewritten(program, points, range(len(points)))
     sources = [
-        Source(source.name, text) for source, text in zip(program.sources, texts, strict=True)
+        source if text == source.text else marked(Source(source.name, text), program.language)
+        for source, text in zip(program.sources, texts, strict=True)
     ]
     read = read_sources(sources, context, program.language)
     check_written(program, read, points)
-    return texts, [point.value for point in read.points]
+    return [source.text for source in sources], [point.value for point in read.points]
 
 
 def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:

@@ -22,7 +22,6 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from weld_twin_core.errors import DataError, TwinError
-from weld_twin_nodes.offline.corrected_before import holds, twice
 
 from ..fleet.cell_page import page_of
 from ..fleet.ranking_page import ranking_page
@@ -33,7 +32,7 @@ from . import pages
 from .access import Access, Doors, People, be, be_nobody
 from .directory import NO_ROOM, NoRoom, is_full, refuse_full
 from .fields import sentence
-from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job, main_file
+from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job
 from .queue import HISTORY, UNKNOWN, Queue
 from .settings import Settings
 from .uploads import Busy, TooMuch, TooSlow, asked_of, asked_of_program, save, save_program
@@ -113,7 +112,6 @@ class _Site:
             if not (beside / DIAGNOSIS).is_file():
                 raise DataError('choose the diagnosis that it is to be corrected by, or drop one')
             job = replace(job, names=names)
-            await run_in_threadpool(self._refuse_corrected, job)
             asked_form = {**form, 'robot': robot or form.get('robot', '')}
             asked = asked_of_program(asked_form, sorted(file.name for file in beside.iterdir()))
             await run_in_threadpool(self._queue.add, job.ask(asked))
@@ -134,14 +132,6 @@ class _Site:
         except BaseException:
             shutil.rmtree(self._queue.folder(job), ignore_errors=True)
             raise
-
-    def _refuse_corrected(self, job: Job) -> None:
-        """Refuse a program that an earlier correction of the same user wrote."""
-        place = job.uploads(self._queue.folder(job))
-        texts = [(place / name).read_bytes() for name in job.names]
-        for before in self._queue.of(job.user):
-            if before.kind == PROGRAM and holds(self._queue.folder(before) / FOUND, texts):
-                raise twice(main_file(job.names), 'an earlier correction of yours wrote it')
 
     def _party(self, request: Request) -> str:
         """Return with whom somebody shares what may wait; empty for nobody."""

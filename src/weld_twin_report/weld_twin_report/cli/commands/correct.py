@@ -9,17 +9,18 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.program_correction import Caps
 from weld_twin_msgs_py.bags import provenance
+from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
-from weld_twin_msgs_py.programs.languages import language_of
+from weld_twin_msgs_py.programs.languages import corrected_twice, language_of
 from weld_twin_msgs_py.programs.source import read_source
 from weld_twin_nodes.cli.given import Given, inputs_of, quantity, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
-from weld_twin_nodes.offline.corrected_before import RESULT, holds, moved, twice
 from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
 
 from . import OF_PROGRAM
 
+RESULT = 'correction.json'
 CAPS = '--max-correction'
 NOISE = '0.03mm'
 """Of a measured coordinate unless given: a tracker or a measuring arm."""
@@ -42,19 +43,15 @@ def run(given: Given) -> int:
 
 
 def _refuse_corrected(program: Path) -> None:
-    """Refuse a program that lies where a correction wrote it."""
-    if moved(program.resolve().parent) == program.name:
-        raise twice(program, f"'{RESULT}' beside it says so")
-
-
-def _refuse_written(program: Program, given: Given) -> None:
-    """Refuse what the folder of the result holds, or one beside it, from wherever it came back."""
-    texts = [source.text.encode('latin-1') for source in program.sources]
-    out = Path(given.out)
-    beside = sorted(file.parent for file in out.absolute().parent.glob(f'*/{RESULT}'))
-    for folder in (out, *beside):
-        if holds(folder, texts):
-            raise twice(given.program, f"'{folder}' holds it as a correction wrote it")
+    """Refuse a program that lies where a correction moved its points: JSON has no remark of that."""
+    try:
+        content = read_json(program.resolve().parent / RESULT)
+    except DataError:
+        return
+    moves = content.get('moves', ())
+    some = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
+    if some and content.get('program') == program.name:
+        raise corrected_twice(program.name, f"'{RESULT}' beside it says so")
 
 
 def _corrected_bag(given: Given) -> int:
@@ -112,7 +109,6 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
 
-    _refuse_written(program, given)
     robot = context.robot
     length, angle = given.max_correction or LARGEST
     caps = Caps(_length(length, CAPS), quantity(angle, ('deg', 'rad'), CAPS))

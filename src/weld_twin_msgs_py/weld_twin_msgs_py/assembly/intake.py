@@ -42,15 +42,13 @@ class Role(Enum):
 class Taken(NamedTuple):
     """A message that has its place in its stream."""
 
-    stamp: int
-    """[ns]"""
+    stamp: int  # [ns]
     row: Array
     """Joints: positions, then velocities, NaN where they are missing, then efforts where they
     were asked for, shape (width,). Pose: position, quaternion x y z w, sigma [m] or NaN, and its
     covariance where its type has one. Point, sigma: three numbers. Wrench: force and torque.
     Temperature: one number."""
-    restarted: bool
-    """It begins a new run: the stamps before it lie in its future."""
+    restarted: bool  # it begins a new run: the stamps before it lie in its future
 
 
 class Intake:

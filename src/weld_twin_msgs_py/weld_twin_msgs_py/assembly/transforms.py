@@ -47,12 +47,9 @@ class NotYet(NoTransform):
 class StampedPose(NamedTuple):
     """Where a frame is in its parent, in numbers as they came: most are never asked for."""
 
-    stamp: int
-    """[ns]"""
-    position: tuple[float, float, float]
-    """[m]"""
-    quaternion: tuple[float, float, float, float]
-    """x y z w."""
+    stamp: int  # [ns]
+    position: tuple[float, float, float]  # [m]
+    quaternion: tuple[float, float, float, float]  # x y z w
 
     @property
     def T_parent_child(self) -> Array:

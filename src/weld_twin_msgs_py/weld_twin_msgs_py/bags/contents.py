@@ -25,26 +25,20 @@ class TopicInfo:
     name: str
     type: str
     count: int
-    use: str = ''
-    """What a diagnosis takes it for; empty for a topic it does not know."""
+    use: str = ''  # what a diagnosis takes it for; empty for a topic it does not know
     start_ns: int | None = None
-    end_ns: int | None = None
-    """Earliest and latest stamp [ns]."""
+    end_ns: int | None = None  # earliest and latest stamp [ns]
     rate_hz: float | None = None
     """From the median step; where they come in bursts the rate underneath; None with fewer than
     two messages."""
-    gaps: int = 0
-    """Steps longer than `GAP` median steps."""
-    longest_gap_s: float = 0.0
-    """[s]"""
+    gaps: int = 0  # steps longer than `GAP` median steps
+    longest_gap_s: float = 0.0  # [s]
     unordered: int = 0
     repeated: int = 0
     unstamped: int = 0
     """Messages that go back in time, repeat the stamp before, or have none."""
-    header: bool = False
-    """The stamps are those of headers, not of the recorder's clock."""
-    sent: Bursts | None = None
-    """How they come, where that is in bursts."""
+    header: bool = False  # the stamps are those of headers, not of the recorder's clock
+    sent: Bursts | None = None  # how they come, where that is in bursts
 
 
 @dataclass(frozen=True)
@@ -56,10 +50,8 @@ class BagInfo:
     start_ns: int
     duration_s: float
     """From the first to the last stamp of the topics in use, else of all [s]."""
-    missing: tuple[str, ...]
-    """What keeps it from being usable, a sentence each."""
-    notes: tuple[str, ...]
-    """What a diagnosis will do without or work around."""
+    missing: tuple[str, ...]  # what keeps it from being usable, a sentence each
+    notes: tuple[str, ...]  # what a diagnosis will do without or work around
     provenance: dict[str, Any]
     incomplete: tuple[str, ...] = ()
     """What of the messages sent is not in it, and which streams begin late or end early."""

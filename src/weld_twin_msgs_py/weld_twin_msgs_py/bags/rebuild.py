@@ -226,12 +226,9 @@ _SCRATCH = '.recovering'
 @dataclass(frozen=True)
 class Recovery:
     source: Path
-    path: Path
-    """Where from, and the new bag."""
-    messages: dict[str, int]
-    """How many of each topic."""
-    damage: tuple[str, ...]
-    """What was wrong, a sentence each."""
+    path: Path  # where from, and the new bag
+    messages: dict[str, int]  # how many of each topic
+    damage: tuple[str, ...]  # what was wrong, a sentence each
 
 
 def recover(path: Path | str, out: Path | str | None = None) -> Recovery:

@@ -101,8 +101,7 @@ class Channel(NamedTuple):
     definition: str = ''
     """Text of a message definition that Jazzy does not know, with its hash; else empty."""
     digest: str = ''
-    qos: tuple[Qos, ...] = ()
-    """As offered; empty for what the table of topics says."""
+    qos: tuple[Qos, ...] = ()  # as offered; empty for what the table of topics says
 
 
 class Segment:

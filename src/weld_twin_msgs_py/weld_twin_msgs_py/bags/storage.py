@@ -26,12 +26,9 @@ _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 class Bag(NamedTuple):
     """Where a bag lies."""
 
-    files: list[Path]
-    """Storage files, in the order they were written."""
-    custom: dict[str, str]
-    """The ``custom_data`` of its metadata."""
-    packed: bool = False
-    """Messages are compressed one by one."""
+    files: list[Path]  # storage files, in the order they were written
+    custom: dict[str, str]  # the ``custom_data`` of its metadata
+    packed: bool = False  # messages are compressed one by one
 
 
 def look(path: Path) -> Bag:

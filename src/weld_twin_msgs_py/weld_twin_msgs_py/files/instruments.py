@@ -24,10 +24,8 @@ _WRITTEN = re.compile(
 class Instrument(NamedTuple):
     """Largest permissible error of a coordinate."""
 
-    least: float
-    """[m]"""
-    per_metre: float
-    """What comes on top for every metre between instrument and point [m/m]."""
+    least: float  # [m]
+    per_metre: float  # what comes on top for every metre between instrument and point [m/m]
     source: str
     away: float | None = None
     """How far away the points are [m]; left out, from the origin of the measuring frame."""

@@ -23,8 +23,7 @@ class GoalPoints(NamedTuple):
     """The robot's part of a joint trajectory."""
 
     goal: Goal
-    columns: tuple[int, ...]
-    """Where the joints of the robot stand in every point."""
+    columns: tuple[int, ...]  # where the joints of the robot stand in every point
 
 
 def read_goal(trajectory: Any, joint_names: Sequence[str]) -> GoalPoints:

@@ -36,8 +36,7 @@ _STAMP = slice(HEADER, HEADER + 8)
 class Layout:
     """Where in the messages of one kind the numbers are, and what is the same in all of them."""
 
-    size: int
-    """Bytes of a message."""
+    size: int  # bytes of a message
     same: tuple[tuple[int, bytes], ...]
     """What every message holds, and from which byte on. Padding is not among it: some senders
     leave there what was in memory."""

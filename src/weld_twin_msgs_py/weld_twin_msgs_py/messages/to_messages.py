@@ -289,14 +289,10 @@ class Lines(NamedTuple):
     """A marker of lines."""
 
     name: str
-    points: Array
-    """Shape (N, 3) [m]."""
-    colors: Array
-    """Red, green, blue of each point, 0 to 1, shape (N, 3)."""
-    width: float
-    """[m]"""
-    strip: bool
-    """One line through all points, or one between each two."""
+    points: Array  # shape (N, 3) [m]
+    colors: Array  # red, green, blue of each point, 0 to 1, shape (N, 3)
+    width: float  # [m]
+    strip: bool  # one line through all points, or one between each two
 
 
 def quaternion(rotation: Array) -> list[float]:

@@ -77,8 +77,7 @@ class Topic:
     offered: Qos
     requested: Qos
     meaning: str
-    steady: bool = True
-    """Messages come on a beat, so that silence means something."""
+    steady: bool = True  # messages come on a beat, so that silence means something
 
     @property
     def stamped(self) -> bool:
@@ -334,8 +333,7 @@ class TopicNames:
     wrench: str = TOOL_WRENCH.name
     temperature: str = TEMPERATURE.name
     contact: str = CONTACT.name
-    images: str = IMAGE_POINTS.name
-    """Topics; a leading slash may be left out."""
+    images: str = IMAGE_POINTS.name  # topics; a leading slash may be left out
     joint_prefix: str = field(default='', metadata=NO_TOPIC)
     """What the joint states put before the names of the robot's joints."""
     joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)

@@ -28,14 +28,11 @@ class _Block:
     """A loop, or branches of which one is taken."""
 
     where: str
-    word: str
-    """That began it, or its last branch, in lower case."""
+    word: str  # that began it, or its last branch, in lower case
     loop: bool
-    head: Frames
-    """What holds where it begins."""
+    head: Frames  # what holds where it begins
     moves: list[Step]
-    first: int
-    """The routine it stands in, and how many moves stand before it."""
+    first: int  # the routine it stands in, and how many moves stand before it
     ends: list[Frames] = field(default_factory=list)
     """What holds at the ends of its branches so far, and where a loop is left or begun anew within."""
 

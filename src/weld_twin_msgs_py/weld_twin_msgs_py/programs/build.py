@@ -29,10 +29,8 @@ Astray = Callable[[Controller], Callable[[Array, Array], tuple[int, ...]]]
 
 
 class Point(NamedTuple):
-    name: str
-    """As the program calls it; 'line 12' for one that stands in the move."""
-    where: str
-    """File and line."""
+    name: str  # as the program calls it; 'line 12' for one that stands in the move
+    where: str  # file and line
     numbers: tuple[Number, ...]
     notation: Notation
     value: Array
@@ -80,8 +78,7 @@ class Step:
 @dataclass(eq=False)
 class Program:
     language: str
-    sources: list[Source]
-    """The first is the program, the others belong to it."""
+    sources: list[Source]  # the first is the program, the others belong to it
     points: list[Point] = field(default_factory=list)
     pieces: list[list[Step]] = field(default_factory=lambda: [[]])
     """Routines; where one begins, nobody knows where the arm is."""
@@ -89,8 +86,7 @@ class Program:
     """Points that must not be moved, with the reason."""
     notes: list[str] = field(default_factory=list)
     """What a reader should know, in sentences."""
-    one_seam: bool = False
-    """The whole program is corrected together or not at all."""
+    one_seam: bool = False  # the whole program is corrected together or not at all
 
     def add_point(
         self,

@@ -41,12 +41,9 @@ ARM = 6
 
 
 class ExternalAxis(NamedTuple):
-    label: str
-    """As the controller calls it."""
-    joint: int
-    """Of the robot, counted from 0."""
-    sign: float = 1.0
-    """-1 where it counts the other way round."""
+    label: str  # as the controller calls it
+    joint: int  # of the robot, counted from 0
+    sign: float = 1.0  # -1 where it counts the other way round
 
 
 def carrying(robot: Robot) -> int:
@@ -118,8 +115,7 @@ COUPLED = 'fanuc-ls'
 class Cell(NamedTuple):
     """What a user tells of the axes beside an arm."""
 
-    external: str = ''
-    """Which joint is which, as ``E1=rail,E2=-tilt``."""
+    external: str = ''  # which joint is which, as ``E1=rail,E2=-tilt``
     along: frozenset[str] | None = None
     """Names of bases that go along with a positioner, in lower case; None where it was not
     told."""
@@ -131,8 +127,7 @@ class Frame(NamedTuple):
     """A tool or base frame as a program names it."""
 
     name: str
-    value: Array | None = None
-    """Shape (4, 4) [m]; None where the program has no numbers."""
+    value: Array | None = None  # shape (4, 4) [m]; None where the program has no numbers
     moving: bool | None = False
     """A base that goes along with a positioner; None where the program does not say."""
     why: str = ''
@@ -149,15 +144,12 @@ class Controller:
     [m]."""
     flange: Array
     """The controller's flange on the last frame of the model, shape (4, 4) [m]."""
-    mix: Array
-    """Joints of the model from those of the controller, shape (n, n)."""
-    own_tool: Array
-    """The tool of the robot's model, shape (4, 4) [m]."""
+    mix: Array  # joints of the model from those of the controller, shape (n, n)
+    own_tool: Array  # the tool of the robot's model, shape (4, 4) [m]
     tools: Mapping[str, Array] = field(default_factory=dict)
     bases: Mapping[str, Array] = field(default_factory=dict)
     """Frames that were given, by the names of the program, in lower case."""
-    notes: list[str] = field(default_factory=list)
-    """What was assumed, in sentences."""
+    notes: list[str] = field(default_factory=list)  # what was assumed, in sentences
     external: tuple[ExternalAxis, ...] = ()
     """In the order of the robot's first joints, which they are."""
     along: frozenset[str] | None = None
@@ -165,8 +157,7 @@ class Controller:
     world_known: bool = True
     """Where bases that stand still count from is known. It is not of an arm on a track, unless
     told."""
-    positioner: bool = False
-    """Some of the external axes move the workpiece."""
+    positioner: bool = False  # some of the external axes move the workpiece
     bare: set[str] = field(default_factory=set)
     """Names of the tools of a program that nobody gives numbers for."""
 

@@ -36,13 +36,10 @@ from .urscript import UrscriptReader
 
 class Language(NamedTuple):
     maker: str
-    extensions: tuple[str, ...]
-    """In lower case, with the point."""
-    signs: str
-    """A regular expression that only programs of this language hold."""
+    extensions: tuple[str, ...]  # in lower case, with the point
+    signs: str  # a regular expression that only programs of this language hold
     reader: type[Reader]
-    pose: Notation
-    """How it writes a pose."""
+    pose: Notation  # how it writes a pose
     beside: tuple[str, ...] = ()
     """Extensions of files that belong to a program and lie beside it."""
     last: tuple[str, ...] = ()

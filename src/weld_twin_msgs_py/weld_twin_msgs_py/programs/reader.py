@@ -18,7 +18,6 @@ from .controllers import Frame
 from .source import Number, Source, masked, number_at, split_outside, stripped
 
 Span = tuple[int, int]
-"""Where a piece of text begins and ends."""
 Handler = Callable[[re.Match[str]], None]
 _HANDED = re.compile(
     r'^[ \t]*(?:\w+[ \t]+)?(?:PROC|DEF|(?:FUNC|DEFFCT)[ \t]+\w+)[ \t]+\w+[ \t]*\(([^)]*)\)',

@@ -47,8 +47,7 @@ class Notation(NamedTuple):
     """One way of writing a target."""
 
     name: str
-    joints: bool
-    """The numbers are joint positions."""
+    joints: bool  # the numbers are joint positions
     value: Callable[[Sequence[float]], Array]
     """Takes the numbers, returns a pose (4, 4) [m] or joint positions (n,) [rad]."""
     numbers: Callable[[Array, Sequence[float]], list[float]]
@@ -172,8 +171,7 @@ _ALONE = re.compile(rf'\s*({NUMBER})\s*\Z')
 class Source:
     """One file of a program."""
 
-    name: str
-    """Without folders."""
+    name: str  # without folders
     text: str
     """Every byte one character, so that what is not understood goes through unharmed."""
 

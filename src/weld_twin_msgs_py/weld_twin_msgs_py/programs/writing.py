@@ -26,34 +26,25 @@ from .source import ABB_POSE, KUKA_POSE, UR_POSE
 class ExportMove(NamedTuple):
     """One move."""
 
-    kind: Literal['joint', 'linear']
-    """'joint' or 'linear'."""
-    q: Array
-    """Joint positions of the model at its end, shape (n,)."""
-    pose: Array
-    """The tool there, in the controller's robot frame, shape (4, 4) [m]."""
+    kind: Literal['joint', 'linear']  # 'joint' or 'linear'
+    q: Array  # joint positions of the model at its end, shape (n,)
+    pose: Array  # the tool there, in the controller's robot frame, shape (4, 4) [m]
     speed: float
     """Of the tool [m/s]; of a joint move what its share of joint speed makes of it."""
-    share: float
-    """Of the joints' speeds."""
+    share: float  # of the joints' speeds
     stop: bool = True
-    dwell: float = 0.0
-    """[s]"""
-    duration: float = 1.0
-    """How long it takes [s]."""
+    dwell: float = 0.0  # [s]
+    duration: float = 1.0  # how long it takes [s]
     comment: str = ''
 
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    name: str
-    """Letters, digits and underscores, as all controllers take it."""
+    name: str  # letters, digits and underscores, as all controllers take it
     moves: tuple[ExportMove, ...]
     context: Context
-    tool: Array
-    """On the controller's flange, shape (4, 4) [m]."""
-    trigger: int
-    """Number of the digital output that tells the instrument when to measure."""
+    tool: Array  # on the controller's flange, shape (4, 4) [m]
+    trigger: int  # number of the digital output that tells the instrument when to measure
     stations: bool
     """The output is on while the arm stands; else from the first to the last move."""
     comments: tuple[str, ...] = ()

@@ -87,8 +87,7 @@ class Chain(NamedTuple):
 
     up: list[Joint]
     """Those of a positioner, from its foot to the base link; empty for a robot alone."""
-    down: list[Joint]
-    """Those of the robot, from the link that both hang on to the tip."""
+    down: list[Joint]  # those of the robot, from the link that both hang on to the tip
     start: Array
     """That link in the frame of reference: the base link, or itself beside a positioner, shape (4,
     4)."""

@@ -73,8 +73,7 @@ class Tree(NamedTuple):
     name: str
     links: dict[str, Link]
     above: dict[str, Joint]
-    corrected: bool = False
-    """A comment says that it holds the numbers of a diagnosis."""
+    corrected: bool = False  # a comment says that it holds the numbers of a diagnosis
 
     @property
     def roots(self) -> list[str]:

@@ -28,11 +28,9 @@ class Cells:
     path: Path
     header: list[str]
     rows: list[list[str]]
-    lines: list[int]
-    """Line number of each row in the file."""
+    lines: list[int]  # line number of each row in the file
     decimal: str
-    said: list[str]
-    """What was found out, one sentence each."""
+    said: list[str]  # what was found out, one sentence each
 
     def column(self, name: str) -> list[str]:
         """Return a column as text."""

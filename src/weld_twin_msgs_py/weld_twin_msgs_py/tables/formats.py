@@ -34,17 +34,13 @@ _HEAD = 40
 class Format:
     """One kind of file."""
 
-    name: str
-    """For people."""
-    mark: str
-    """Pattern that the top of such a file matches, and no other."""
-    header: str
-    """Pattern of the line that names the columns."""
+    name: str  # for people
+    mark: str  # pattern that the top of such a file matches, and no other
+    header: str  # pattern of the line that names the columns
     names: tuple[tuple[str, str], ...]
     """Pattern of a joined name and what it is called; ``{unit}`` is the file's unit of length. A
     group ``what`` is the marker or body that a column belongs to."""
-    delimiter: str = ','
-    """Blank for any white space."""
+    delimiter: str = ','  # blank for any white space
     above: int = 0
     below: int = 0
     """Lines over the header that belong to it, and lines under it that are no rows."""
@@ -54,8 +50,7 @@ class Format:
     """Pattern with the frames per second as its group, where there is no column of times."""
     named_by: str = ''
     """Pattern with a list of names, three columns each, where there is no header."""
-    gap: str = ''
-    """What stands for a coordinate that was not seen."""
+    gap: str = ''  # what stands for a coordinate that was not seen
 
     def tells(self, text: str) -> bool:
         """Return whether a text begins so."""
@@ -94,11 +89,9 @@ class Rank(IntEnum):
 class Form:
     """One kind of file that is no table like any other."""
 
-    name: str
-    """For people, as docs/tables.md has it."""
+    name: str  # for people, as docs/tables.md has it
     rank: Rank
-    tells: Callable[[Any], bool]
-    """Takes the text, or the bytes of a file that is no text."""
+    tells: Callable[[Any], bool]  # takes the text, or the bytes of a file that is no text
     read: Callable[[Path, Any, str | None], Read]
     """Takes path, text or bytes, and the marker that is meant."""
 

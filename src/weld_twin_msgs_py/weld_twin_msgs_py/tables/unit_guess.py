@@ -20,9 +20,7 @@ from weld_twin_core.errors import DataError
 from .cells import Cells
 
 METRES = {'m': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'um': 1e-6, 'in': 0.0254, 'ft': 0.3048}
-"""Lengths a table may be in."""
 RADIANS = {'rad': 1.0, 'deg': np.pi / 180.0, 'mrad': 1e-3}
-"""Angles a table may be in."""
 _WIDEST = 20.0
 """Spread [m] of measured positions beyond that of any cell with one robot."""
 _DOUBT = 6.0
@@ -83,7 +81,6 @@ def _spread(position: Array) -> float:
 
 
 _SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0}
-"""Units a clock may count in."""
 _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
 

@@ -219,7 +219,6 @@ class Given(argparse.Namespace):
 
 
 PAGE = 'report.html'
-"""The page in a folder of results."""
 
 
 def _clamped(file: str, robot: Robot, options: TableOptions) -> Table:

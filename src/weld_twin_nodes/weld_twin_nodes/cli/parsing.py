@@ -32,7 +32,6 @@ from typing import Any, NamedTuple
 Options = str | Callable[[argparse.ArgumentParser], None]
 """A table of options, or a function that adds some by itself."""
 RARE = 'rare'
-"""Heading of the rows that few need."""
 AGAIN = 'may be given again'
 _DEFAULT = re.compile(r'\[default: (.*?)\]')
 _INTEGERS = ('N', 'NANOS')
@@ -45,8 +44,7 @@ _NUMBERS = (
 class Command(NamedTuple):
     """A command, or a job of one, as a row of a table."""
 
-    text: str
-    """Its help; the first line is what the list of commands says of it."""
+    text: str  # its help; the first line is what the list of commands says of it
     example: str = ''  # a whole command line
     options: tuple[Options, ...] = ()
     jobs: Mapping[str, Command] = {}  # by name; none of a command that does one thing

@@ -38,18 +38,12 @@ TELL_EVERY = 1.0
 class Playing(NamedTuple):
     """How to play."""
 
-    rate: float = 1.0
-    """Speed against the recording."""
-    clock: float = 0.0
-    """How often to tell the recording's time on /clock [1/s]; 0 never."""
-    topics: Collection[str] = ()
-    """What to play; empty for all."""
-    loop: int = 1
-    """How often; 0 until stopped."""
-    subscribers: int = 1
-    """How many each topic is to have before the start."""
-    wait: float = 5.0
-    """Longest time to wait for them [s]."""
+    rate: float = 1.0  # speed against the recording
+    clock: float = 0.0  # how often to tell the recording's time on /clock [1/s]; 0 never
+    topics: Collection[str] = ()  # what to play; empty for all
+    loop: int = 1  # how often; 0 until stopped
+    subscribers: int = 1  # how many each topic is to have before the start
+    wait: float = 5.0  # longest time to wait for them [s]
 
 
 def play(bag: Path | str, how: Playing, tell: Callable[[str], None]) -> int:

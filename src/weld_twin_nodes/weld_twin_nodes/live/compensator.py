@@ -453,7 +453,6 @@ class Compensator(ManagedNode):
 
 
 main = partial(run, Compensator)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

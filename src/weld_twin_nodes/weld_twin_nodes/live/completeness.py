@@ -84,8 +84,7 @@ class Shortfall(NamedTuple):
 
     sent: int
     recorded: int
-    where: str
-    """'at the start', 'at the end', 'at both ends', or 'in between'."""
+    where: str  # 'at the start', 'at the end', 'at both ends', or 'in between'
 
     def sentence(self, topic: str) -> str:
         """Return it in words."""

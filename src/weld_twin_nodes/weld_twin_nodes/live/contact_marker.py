@@ -178,7 +178,6 @@ class ContactMarker(CellNode):
 
 
 main = partial(run, ContactMarker)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -170,7 +170,6 @@ class DeviationAnalyzer(CellNode):
 
 
 main = partial(run, DeviationAnalyzer)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -145,7 +145,6 @@ class DeviationMarkers(CellNode):
 
 
 main = partial(run, DeviationMarkers)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -49,13 +49,10 @@ class Job(NamedTuple):
 class Finding(NamedTuple):
     """What a diagnosis says, as plain values."""
 
-    stamp: int
-    """Of the last measurement looked at [ns]."""
+    stamp: int  # of the last measurement looked at [ns]
     status: str
-    sentence: str
-    """The verdict in words."""
-    values: dict[str, Any]
-    """Keys and values of the diagnostic message."""
+    sentence: str  # the verdict in words
+    values: dict[str, Any]  # keys and values of the diagnostic message
 
 
 class Worker:

@@ -48,7 +48,6 @@ class ErrorInjector(ModelNode):
 
 
 main = partial(run, ErrorInjector)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

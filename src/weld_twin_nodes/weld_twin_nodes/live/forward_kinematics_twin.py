@@ -80,7 +80,6 @@ class ForwardKinematicsTwin(ModelNode):
 
 
 main = partial(run, ForwardKinematicsTwin)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

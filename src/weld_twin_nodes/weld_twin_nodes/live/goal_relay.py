@@ -37,14 +37,11 @@ GONE = 2.0
 class Decision(NamedTuple):
     """What becomes of a goal."""
 
-    goal: Any
-    """To be sent on; None for none."""
-    why: str
-    """Why there is none."""
+    goal: Any  # to be sent on; None for none
+    why: str  # why there is none
     settled: Callable[[str], None]
     """Called with whether the controller took it, in words: empty where it did."""
-    token: object = None
-    """Of the model it was decided with, for `GoalRelay.since`."""
+    token: object = None  # of the model it was decided with, for `GoalRelay.since`
 
 
 class _Running:

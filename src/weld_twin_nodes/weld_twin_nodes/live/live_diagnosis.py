@@ -312,7 +312,6 @@ class LiveDiagnosis(ManagedNode):
 
 
 main = partial(run, LiveDiagnosis)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

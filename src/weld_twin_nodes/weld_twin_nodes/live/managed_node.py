@@ -40,7 +40,6 @@ STATES = {
     getattr(State, f'TRANSITION_STATE_{name.upper()}'): name
     for name in ('configuring', 'cleaningup', 'shuttingdown', 'activating', 'deactivating')
 }
-"""States by their numbers."""
 
 
 class Step(NamedTuple):
@@ -67,7 +66,6 @@ STEPS = (
         )
     ),
 )
-"""The transitions that somebody may ask for."""
 
 
 class Later:

@@ -32,7 +32,6 @@ _EVERYBODY_ANSWERS = tuple(
     )
 )
 COMMON = frozenset({*_EVERYBODY_SAYS, *_EVERYBODY_HEARS, *_EVERYBODY_ANSWERS})
-"""What every node has."""
 _MANAGED_ANSWER = tuple(
     f'~/{name}'
     for name in (
@@ -53,10 +52,8 @@ class Spoken(NamedTuple):
     hears: tuple[str, ...]
     answers: tuple[str, ...]
     asks: tuple[str, ...] = ()
-    does: tuple[str, ...] = ()
-    """Actions that it offers."""
-    sends: tuple[str, ...] = ()
-    """Actions of others that it sends goals to."""
+    does: tuple[str, ...] = ()  # actions that it offers
+    sends: tuple[str, ...] = ()  # actions of others that it sends goals to
 
 
 def _names(rows: Iterable[Topic | str]) -> set[str]:

@@ -36,7 +36,6 @@ BUILT_IN = (
     *(f'int{size}' for size in _SIZES),
     *(f'uint{size}' for size in _SIZES),
 )
-"""Primitive types of the interface definition language."""
 
 
 def definition(kind: str) -> str:

@@ -339,7 +339,6 @@ class Recorder(ManagedNode):
 
 
 main = partial(run, Recorder)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -88,19 +88,13 @@ class Setting:
     """One parameter."""
 
     name: str
-    default: Any
-    """Also fixes the type, unless ``numbers`` is set."""
-    description: str
-    """What it is for, with its unit in square brackets."""
+    default: Any  # also fixes the type, unless ``numbers`` is set
+    description: str  # what it is for, with its unit in square brackets
     low: float | None = None
-    high: float | None = None
-    """Range of a number, ends included."""
-    live: bool = False
-    """May be changed while the node runs."""
-    numbers: bool = False
-    """It is a list of numbers; `NO_NUMBERS` where it is not set."""
-    choices: tuple[str, ...] = ()
-    """What it may be; empty for anything."""
+    high: float | None = None  # range of a number, ends included
+    live: bool = False  # may be changed while the node runs
+    numbers: bool = False  # it is a list of numbers; `NO_NUMBERS` where it is not set
+    choices: tuple[str, ...] = ()  # what it may be; empty for anything
 
     def odd(self, value: Any) -> str:
         """Return why a value is none that it may be; empty where it is one."""

@@ -156,17 +156,13 @@ MOST = 10_000
 class Wanted:
     """What is asked for of a topic."""
 
-    given: str
-    """Its name, before remapping and without the namespace."""
-    kinds: tuple[str, ...]
-    """Message types that are understood, the usual one first."""
+    given: str  # its name, before remapping and without the namespace
+    kinds: tuple[str, ...]  # message types that are understood, the usual one first
     qos: Qos
-    any_kind: bool = False
-    """Whether any other type is taken too."""
+    any_kind: bool = False  # whether any other type is taken too
     own: str = ''
     """Its name in the table of topics, which another namespace would go before."""
-    required: bool = False
-    """Whether the node can do nothing without it."""
+    required: bool = False  # whether the node can do nothing without it
     yields: tuple[str, ...] = ()
     """Policies of which less is asked for where a publisher offers less."""
 

@@ -382,7 +382,6 @@ def _listened(listeners: dict[str, int]) -> str:
 
 
 main = partial(run, TrajectoryGenerator)
-"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -47,22 +47,17 @@ class Sent(NamedTuple):
 class Heard(NamedTuple):
     """What one input of a node has of its topic."""
 
-    publishers: int
-    """Whose messages reach it, by the middleware of its own process."""
-    received: int
-    """Messages."""
+    publishers: int  # whose messages reach it, by the middleware of its own process
+    received: int  # messages
 
 
 class Word(NamedTuple):
     """What a node said at a time."""
 
     node: str
-    run: str
-    """Number of its start."""
-    at: float
-    """When it was heard [s]."""
-    inputs: frozenset[str]
-    """Topics that it listens to."""
+    run: str  # number of its start
+    at: float  # when it was heard [s]
+    inputs: frozenset[str]  # topics that it listens to
     sent: Mapping[str, Sent]
     reached: Mapping[str, int]
     heard: Mapping[str, Heard]

@@ -101,8 +101,7 @@ class RemainingCause(NamedTuple):
 
     sites: tuple[Site, ...]  # one, or all of a kind
     share: float
-    std: float
-    """Of the size it had: 0 for gone, 1 for as it was."""
+    std: float  # of the size it had: 0 for gone, 1 for as it was
     rms_m: float  # how far a whole one moves the tool on this motion
 
     @property

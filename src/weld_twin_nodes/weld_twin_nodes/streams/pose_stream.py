@@ -45,12 +45,10 @@ SPAN = 0.05
 class Given(NamedTuple):
     """What becomes of a pose."""
 
-    pose: Array | None
-    """To be sent on, shape (4, 4); None for nothing."""
+    pose: Array | None  # to be sent on, shape (4, 4); None for nothing
     added: Array | None
     """What was, or would be, added, shape (6,) [m, rad]; None where it is not known."""
-    why: str = ''
-    """Why it is not corrected; empty where it is."""
+    why: str = ''  # why it is not corrected; empty where it is
 
 
 class _Ramp(NamedTuple):

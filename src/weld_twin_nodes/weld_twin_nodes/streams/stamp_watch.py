@@ -268,12 +268,9 @@ RUSH = 0.5
 class Seen(NamedTuple):
     """What a look at the stamps finds."""
 
-    missing: int = 0
-    """Messages, by the gaps of a stream on a beat."""
-    step: float = 0.0
-    """The beat, 0 where there is none [s]."""
-    ahead: float = 0.0
-    """How far the stamps jumped forwards, 0 where they did not [s]."""
+    missing: int = 0  # messages, by the gaps of a stream on a beat
+    step: float = 0.0  # the beat, 0 where there is none [s]
+    ahead: float = 0.0  # how far the stamps jumped forwards, 0 where they did not [s]
     back: float = 0.0
     """How far behind the last ones the stamps begin anew, 0 where they do not [s]."""
 

@@ -35,8 +35,7 @@ LOST = 2.0
 class Promise(NamedTuple):
     """What a model leaves on data it has not seen."""
 
-    rms: float
-    """Distance of measurements from the twin, noise included [m]."""
+    rms: float  # distance of measurements from the twin, noise included [m]
     beside_noise: float
     """What a mean of many measurements of one posture may still be off by [m]."""
 

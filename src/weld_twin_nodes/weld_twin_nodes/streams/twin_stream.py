@@ -77,20 +77,15 @@ class HeldSignal:
 class Sample(NamedTuple):
     """The arm at one joint stamp."""
 
-    stamp: int
-    """Of the joint state [ns]."""
+    stamp: int  # of the joint state [ns]
     pose_stamp: int
     """Of a measurement that shows this pose [ns]; later by the delay of the measurement clock."""
-    q: Array
-    """Shape (n,) [rad or m]."""
-    poses: Poses
-    """One position (3,) and rotation (3, 3)."""
+    q: Array  # shape (n,) [rad or m]
+    poses: Poses  # one position (3,) and rotation (3, 3)
     wrench: Array | None = None
     """In force at the joint state, in ``wrench_frame``, shape (6,) [N, N m]."""
-    wrench_frame: str = 'tool'
-    """'tool' or 'base'."""
-    temperature: float | None = None
-    """[degC]"""
+    wrench_frame: str = 'tool'  # 'tool' or 'base'
+    temperature: float | None = None  # [degC]
     effort: Array | None = None
     """As measured, where effects of the twin take it, shape (n,) [N m, or N of a slide]."""
 

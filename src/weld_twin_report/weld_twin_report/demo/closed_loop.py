@@ -42,8 +42,7 @@ class Seam:
     """One run along a seam."""
 
     meant: Array
-    real: Array
-    """Shape (N, 3) [m]: where the tool was to be, and where it was measured."""
+    real: Array  # shape (N, 3) [m]: where the tool was to be, and where it was measured
 
     @cached_property
     def off(self) -> Array:
@@ -131,7 +130,6 @@ STANDS = 30
 BEAT = 20_000_000
 """Nanoseconds between two poses."""
 Weld = Callable[[bool], Seam]
-"""Welds the seam, corrected or not."""
 
 
 def close_loop(job: Job, progress: Progress) -> None:

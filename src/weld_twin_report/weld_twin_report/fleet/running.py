@@ -63,8 +63,7 @@ class Listed:
     effects_known: str = ''
     base_link: str = ''
     tip_link: str = ''
-    contacts: str = ''
-    """Empty for none."""
+    contacts: str = ''  # empty for none
     apply: bool = False  # whether a mistake in data or set-up is corrected
 
     @property

@@ -32,8 +32,7 @@ PASSING = 'base '
 class Entry:
     at: datetime  # when it was recorded, UTC
     robot: str
-    kinematics: str
-    """Name and fingerprint of the robot's model."""
+    kinematics: str  # name and fingerprint of the robot's model
     recording: str  # SHA-256 of what was diagnosed
     status: str
     confidence: float | None
@@ -44,8 +43,7 @@ class Entry:
     names: tuple[str, ...]
     """Coordinates that say something of the arm; none where the data were unsound."""
     value: Array
-    prior_std: Array
-    """shape (P,)."""
+    prior_std: Array  # shape (P,)
     covariance: Array  # shape (P, P)
     tool: Array  # shape (4, 4), the fitted tool frame
 

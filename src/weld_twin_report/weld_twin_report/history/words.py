@@ -87,7 +87,6 @@ WEEK = 7.0
 ALIKE = 3
 """Alternatives in a sentence; more are counted."""
 HEADS = ('recorded', 'verdict', 'sure', 'gap', 'left', 'causes')
-"""Heads of a table of diagnoses."""
 
 
 def row(entry: Entry, most: int | None = None) -> tuple[str, ...]:

@@ -59,8 +59,7 @@ class Ripple(NamedTuple):
 
     joint: str
     rms: float
-    lines: tuple[tuple[float, float], ...]
-    """Order and amplitude [rad], strongest first."""
+    lines: tuple[tuple[float, float], ...]  # order and amplitude [rad], strongest first
 
 
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
@@ -142,8 +141,7 @@ class Alternative(NamedTuple):
     likely: str
     left: str
     change: str
-    length: float
-    """What it leaves, as a part of the gap."""
+    length: float  # what it leaves, as a part of the gap
 
 
 class Holds(NamedTuple):

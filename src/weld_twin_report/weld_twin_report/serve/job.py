@@ -47,8 +47,7 @@ class Asked:
     """A bundled robot, or the name of a robot file among those dropped; empty until it is given."""
     apply: bool = False  # whether a mistake in data or set-up is corrected
     cell: str = ''
-    at: str = ''
-    """Into whose history it goes, and when it was recorded; empty for neither."""
+    at: str = ''  # into whose history it goes, and when it was recorded; empty for neither
     told: dict[str, str] = field(default_factory=dict)
     """The other fields of the form, by their names in `fields.FIELDS`; checked."""
 

@@ -109,8 +109,7 @@ def test_what_info_and_a_diagnosis_say_of_lacking_measurements_is_the_same(tmp_p
 
 
 def test_an_empty_bag_is_described_not_refused(tmp_path):
-    with BagWriter(tmp_path / 'bag') as bag:
-        bag.add_topic('/joint_states', 'sensor_msgs/msg/JointState')
+    BagWriter(tmp_path / 'bag').open().close()
     info = bag_info(tmp_path / 'bag')
     assert info.duration_s == 0.0
     assert not info.usable

@@ -92,7 +92,7 @@ class GrowingBag:
             if self._full(segments, log_ns):
                 segments.split()
             channel = self._channels.get((topic, kind)) or Channel(topic, kind)
-            segments.write(channel, data, log_ns)
+            segments.growing.write(channel, data, log_ns)
 
     def flush(self) -> None:
         """Put what was written on the disk, where it outlives this process and a power cut."""
@@ -118,7 +118,7 @@ class GrowingBag:
     def release(self) -> None:
         """Let go of the bag as it is, unfinished."""
         if self._segments is not None:
-            self._segments.abort()
+            self._segments.growing.abort()
         if self._lock >= 0:
             os.close(self._lock)
         self._segments, self._lock = None, -1

@@ -21,7 +21,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from traceback import clear_frames
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from lz4.frame import LZ4FrameDecompressor
@@ -152,7 +151,6 @@ class BagReader:
         self._stack = ExitStack()
 
     def __enter__(self) -> BagReader:
-        """Open the storage."""
         try:
             with clear_errors(self.path):
                 bag = look(self.path)
@@ -166,13 +164,7 @@ class BagReader:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the storage."""
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:

@@ -338,7 +338,7 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
                 _write(segments, result, file, counts, damage)
         segments.finish(_provenance(source, damage))
     finally:
-        segments.abort()
+        segments.growing.abort()
     return counts
 
 
@@ -353,7 +353,7 @@ def _write(
         damage.tell(file, 'holds broken messages, which are left out')
         return
     try:
-        segments.write(channel, data, log_ns)
+        segments.growing.write(channel, data, log_ns)
     except DataError as error:
         damage.tell(file, f'is recovered without some of its messages: {error}')
     else:

@@ -73,13 +73,8 @@ class _McapWriter(McapWriter):
         metadata = BytesIO()
         for text in (OFFERED, offered_qos_profiles, TYPE_HASH, connection.digest):
             write_string(metadata, text)
-        channel = McapChannel(
-            connection.id,
-            connection.msgtype,
-            connection.topic,
-            'cdr',
-            metadata.getvalue(),
-        )
+        own = connection.id, connection.msgtype, connection.topic
+        channel = McapChannel(*own, 'cdr', metadata.getvalue())
         self.channels.append(channel)
         self.channel_stats[connection.id] = 0
         write_channel(self.chunk.bio, channel, self.schemas)
@@ -272,10 +267,6 @@ class Segments:
         self._complete: list[dict[str, Any]] = []
         self.growing = self._next()
 
-    def write(self, channel: Channel, data: bytes, log_ns: int) -> None:
-        """Write a serialised message."""
-        self.growing.write(channel, data, log_ns)
-
     def split(self) -> None:
         """Complete the file that grows and begin another."""
         self._settle()
@@ -291,10 +282,6 @@ class Segments:
         sync(scratch)
         scratch.replace(listing)
         sync(self.folder)
-
-    def abort(self) -> None:
-        """Let go of everything as it is."""
-        self.growing.abort()
 
     def _next(self) -> Segment:
         segment = Segment(self.folder / f'{self._name}_{len(self._complete)}', self._storage)

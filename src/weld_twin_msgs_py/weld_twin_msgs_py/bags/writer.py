@@ -12,7 +12,6 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from weld_twin_core.errors import DataError
@@ -78,12 +77,6 @@ class BagWriter:
                     channel = channels[topic, kind] = Channel(topic, kind)
                 segment.write(channel, data, ns)
 
-    def add_topic(self, topic: str, kind: str) -> None:
-        """Announce a topic that may stay without messages."""
-        segment = self._opened()
-        with self._clear_errors():
-            segment.announce(Channel(topic, kind))
-
     def close(self) -> None:
         """Finish the bag and put it in its place."""
         if self._segment is None or self._scratch is None:
@@ -111,13 +104,7 @@ class BagWriter:
     def __enter__(self) -> BagWriter:
         return self.open()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Finish the bag, or throw it away when the block failed."""
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
             self.close()
         else:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
+from functools import cache
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -22,6 +22,7 @@ from weld_twin_core.recording import JointMotion
 
 from .from_messages import NANOSECONDS
 from .image_points import DOUBLE, FIELDS
+from .topics import message_class
 
 LEVELS = (b'\x00', b'\x01', b'\x02', b'\x03')
 """Levels of a DiagnosticStatus: ok, warn, error, stale."""
@@ -324,15 +325,8 @@ def _text(value: Any) -> str:
 
 def ros_messages() -> Messages:
     """Return the factory of rclpy messages; needs a ROS installation."""
-    cache: dict[str, Any] = {}
-
-    def lookup(kind: str) -> Any:
-        if kind not in cache:
-            package, folder, name = kind.split('/')
-            cache[kind] = getattr(import_module(f'{package}.{folder}'), name)
-        return cache[kind]
-
     # rclpy refuses numpy arrays for sequences and wants a byte as bytes.
+    lookup = cache(message_class)
     return Messages(lookup, lambda values: array('d', values), lambda level: LEVELS[level])
 
 

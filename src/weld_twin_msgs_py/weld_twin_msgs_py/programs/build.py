@@ -168,7 +168,10 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
     count = len(controller.external)
     controller.name_tools(step.tool for step in program.steps)
     arm = CarriedArm(robot.with_frames(base=np.eye(4)), count)
-    points = [_with_external(point, count) for point in program.points]
+    points = [
+        point if point.value.ndim == 2 else point._replace(external=point.value[:count])
+        for point in program.points
+    ]
     seam, pieces = -1, []
     for steps in program.pieces:
         seam += 1
@@ -183,11 +186,6 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
     external = tuple(still if point.external is None else point.external for point in points)
     values = tuple(point.value for point in points)
     return MoveProgram(values, tuple(pieces), external if count else ())
-
-
-def _with_external(point: Point, count: int) -> Point:
-    """Return a point that says where the external axes stand, as one of all joints does anyway."""
-    return point if point.value.ndim == 2 else point._replace(external=point.value[:count])
 
 
 def _move(

@@ -188,11 +188,9 @@ class Parser(argparse.ArgumentParser):
         self.example = ''
         # Several numbers may begin with a sign as one may: --joint-offsets -90,0,... is no option.
         self._negative_number_matcher = re.compile(r'^-\.?\d')
-        hidden: dict[str, Any] = {
-            'nargs': 0,
-            'help': argparse.SUPPRESS,
-            'default': argparse.SUPPRESS,
-        }
+        hidden: dict[str, Any] = {'nargs': 0} | dict.fromkeys(
+            ('help', 'default'), argparse.SUPPRESS
+        )
         self.add_argument('-h', '--help', action=_Help, **hidden)
         self.add_argument('--help-all', action=_Help, **hidden)
 
@@ -238,14 +236,7 @@ def _place(action: argparse.Action) -> str:
 class _Help(argparse.Action):
     """Print the help and end."""
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        assert isinstance(parser, Parser)
+    def __call__(self, parser: Any, _: Any, values: Any, option_string: str | None = None) -> None:
         print(parser.format_help(everything=option_string == '--help-all'), end='')
         parser.exit()
 

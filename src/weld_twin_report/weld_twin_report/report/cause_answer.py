@@ -278,7 +278,8 @@ class CauseAnswer:
             return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
-            ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])
+            warned = warning(self.diagnosis, self.k)
+            ways = filter(None, [*dict.fromkeys(map(gearing, effects)), warned])
             steps = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
         if effects and self.alike:
             return [
@@ -286,10 +287,6 @@ class CauseAnswer:
                 *steps,
             ]
         return steps
-
-    @property
-    def _warning(self) -> str:
-        return warning(self.diagnosis, self.k)
 
     @property
     def _correction(self) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.circle import Circle, circle_of
 from weld_twin_core.recording import Recording
@@ -109,7 +108,7 @@ def circles_section(page: Content) -> Html | None:
 def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     path = diagnosis.traces.measured[k] - diagnosis.traces.before[k]
     good = trusted(diagnosis, k)
-    radial = _radial(circle, path, as_it_is(diagnosis, k))[good]
+    radial = np.asarray((circle.outwards(path) * as_it_is(diagnosis, k)).sum(axis=1))[good]
     name = diagnosis.recordings[k].name
     caption = (
         f'{name}: radius {millimetres(circle.radius)}, '
@@ -136,7 +135,3 @@ def _key(changes: bool) -> Html:
     ]  # fmt: skip
     items = [tag('li', tag('i', class_=f'swatch {colour}'), ' ', words) for colour, words in rows]
     return tag('ul.key', *items)
-
-
-def _radial(circle: Circle, path: Array, deviation: Array) -> Array:
-    return np.asarray((circle.outwards(path) * deviation).sum(axis=1))

@@ -16,9 +16,7 @@ EFFECT = '''
 
     import numpy as np
 
-    from .effect import LinearEffect
-    from .hooks import Traits
-    from .registry import register
+    from .effect import LinearEffect, Traits, register
     from .view import Parameter, Stage, Value
     from .wording import size
 

@@ -282,11 +282,7 @@ def _numbers(image: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def adjusted(seen: Sightings) -> _Adjusted:
-    """
-    Return the poses that images tell.
-
-    Raises DataError: images show too little, or cameras and targets do not hang together.
-    """
+    """Return the poses that images tell; DataError where these show or hang together too little."""
     start = bodies(seen)
     seen = seen.take(start.rows)
     state = _State(

@@ -27,11 +27,7 @@ def hermite(x: Array, y: Array, slope: Array, at: Array) -> tuple[Array, Array]:
 
 
 def natural_slopes(x: Array, y: Array) -> Array:
-    """
-    Return slopes (N, n) of the natural spline: no jump in its bend, and none at its ends.
-
-    For few knots (N,): the equations are solved as a full matrix.
-    """
+    """Return slopes (N, n) of the natural spline through few knots (N,), by one full matrix."""
     h, count = np.diff(x), x.size
     chord = np.diff(y, axis=0) / h[:, None]
     system, wanted = np.zeros((count, count)), np.zeros(y.shape)

@@ -123,11 +123,7 @@ def positive(covariance: Array) -> NDArray[np.bool_]:
 
 
 def inverse_error(position: Array, rotation: Array) -> Array:
-    """
-    Return what errors of poses do to the inverse poses, shape (M, 6, 6).
-
-    Errors are shifts and turns about the axes outside.
-    """
+    """Return what errors of poses, as outer shifts and turns, do to inverse poses, shape (M, 6, 6)."""
     back = np.swapaxes(rotation, 1, 2)
     out = np.zeros((len(position), 6, 6))
     out[:, :3, :3] = out[:, 3:, 3:] = -back

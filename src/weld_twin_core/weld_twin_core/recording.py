@@ -294,11 +294,7 @@ COLDEST, HOTTEST = -273.15, 200.0
 
 
 def checked_temperature(celsius: float) -> float:
-    """
-    Return a temperature [degC].
-
-    Raises DataError: it is not finite, below absolute zero, or so high that it must be in kelvin.
-    """
+    """Return a temperature [degC]; DataError for none, or for one that must be in kelvin."""
     if not np.isfinite(celsius) or celsius < COLDEST:
         raise DataError(f'the temperature is {celsius} degC, which is no temperature')
     if celsius > HOTTEST:

@@ -91,11 +91,7 @@ def tool_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
 
 
 def root_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
-    """
-    Return rotation (..., 3, 3) and origin (..., 3) of the robot's base in the positioner's foot.
-
-    The foot is what is displaced, in the axes of the base: xyz, and a turn about its own origin.
-    """
+    """Return rotation (..., 3, 3) and origin (..., 3) of the base in the positioner's displaced foot."""
     rotation, origin = robot.T_root_base[:3, :3], robot.T_root_base[:3, 3]
     error = _six(shift, 'root')
     if error is None:

@@ -76,11 +76,7 @@ class ControllerFrames:
 
 
 def frame_of(value: Any, name: str) -> Array:
-    """
-    Return the frame (4, 4) of a mapping with ``xyz`` [m] and ``quat_xyzw``; of None the identity.
-
-    Raises DataError: a number is missing or not finite, or the quaternion is not of length 1.
-    """
+    """Return the frame (4, 4) of ``xyz`` [m] and ``quat_xyzw``, of None the identity; else DataError."""
     if value is None:
         return np.eye(4)
     position = readonly(value.get('xyz', (0.0, 0.0, 0.0)), (3,), f'{name} xyz')

@@ -26,11 +26,7 @@ def up(robot: Robot) -> Array:
 
 
 def rising(robot: Robot) -> float:
-    """
-    Return 1 where the arm rises from its foot along z of its first row, -1 where against it.
-
-    The second axis tells it; where that meets the foot, z of the link that it stands in does.
-    """
+    """Return 1 where the arm rises from its foot along z of its first row, -1 where against it."""
     if robot.n > 1 and not robot.prismatic[0]:
         chain = frames(robot.with_frames(base=np.eye(4)), np.zeros(robot.n))
         rise = float(chain.rows[1].z_point[2])

@@ -168,11 +168,7 @@ class Robot:
 
     @property
     def T_base_origin(self) -> Array:
-        """
-        Return the link that poses are measured from, in the frame where the chain begins, (4, 4).
-
-        The arm stands in it; of a workpiece on a positioner it is the table.
-        """
+        """Return the link that poses are measured from where the chain begins: foot or table, (4, 4)."""
         if self.controller is None or self.controller.foot is None:
             return np.eye(4)
         return self.controller.foot

@@ -48,11 +48,7 @@ class Bodies:
 
 
 def bodies(seen: Sightings) -> Bodies:
-    """
-    Return a start from what every image shows by itself.
-
-    Raises DataError: no image shows enough of a target, or a camera or target hangs with no other.
-    """
+    """Return a start from what every image shows by itself; DataError where that is too little."""
     views = _views(seen)
     if not views:
         raise DataError(

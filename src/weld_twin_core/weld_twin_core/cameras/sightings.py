@@ -51,12 +51,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """
-    Points that a camera can find, such as the corners of a board.
-
-    Raises DataError: a label comes twice, there are no three points, or an uncertainty is not
-    positive.
-    """
+    """Points that a camera can find, such as corners of a board; DataError where they are none."""
 
     name: str
     labels: tuple[str, ...]
@@ -107,12 +102,7 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """
-    Points seen, one row each.
-
-    Raises DataError: shapes that do not fit, or no camera sees a target that the arm moves before
-    it.
-    """
+    """Points seen, one row each; DataError for shapes that do not fit, or what the arm does not move."""
 
     cameras: tuple[Camera, ...]
     targets: tuple[Target, ...]

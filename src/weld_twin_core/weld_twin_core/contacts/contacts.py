@@ -16,11 +16,7 @@ from .artefact import Artefact
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """
-    Contacts of the tool point, one for every posture.
-
-    Raises DataError: a label is not in the artefact, or a length has no value.
-    """
+    """Contacts of the tool point, one for every posture; DataError for one that is not known."""
 
     artefact: Artefact
     labels: tuple[str, ...]

@@ -54,12 +54,7 @@ class Places:
         return residual, seen, free
 
     def ties(self) -> tuple[Array, Array, Array]:
-        """
-        Return how far what is known is off, its change with unknowns, and its uncertainty.
-
-        Shapes (T,), (T, Z) and (T,) [m or rad]: lengths and angles between contacts, and known
-        places.
-        """
+        """Return how far off what is known is (T,), change (T, Z), uncertainty (T,) [m or rad]."""
         ends = np.cumsum([0, *(surface.freedom for surface in self.surfaces)])
         where = {s.contact.label: k for k, s in enumerate(self.surfaces)}
         parts = []
@@ -140,11 +135,7 @@ def _apart(tie: Tie, first: Surface, second: Surface) -> tuple[Array, Array, Arr
 
 
 def places(contacts: Contacts, points: Array) -> Places:
-    """
-    Return where contacts of a place are, from the tool points (M, 3) [m] that touched them.
-
-    Least squares that gives gross outliers little weight; known distances and angles are met.
-    """
+    """Return where contacts are, by tool points (M, 3) [m] that touched them; outliers count little."""
     surfaces = []
     for contact in contacts.artefact.contacts:
         index = contacts.of(contact.label)

@@ -111,12 +111,7 @@ class Surface:
         return replace(self, point=point, axis=axis / np.linalg.norm(axis))
 
     def from_known_place(self) -> tuple[Array, Array, Array]:
-        """
-        Return how far it is from its known place (k,), the change of that, and its uncertainty.
-
-        The change (k, z) is by the unknowns, the uncertainty (k,) in m or rad; k is 0 where it may
-        be anywhere.
-        """
+        """Return how far it is from its known place (k,), if any, change (k, z) and uncertainty (k,)."""
         known = self.contact
         if known.at is None:
             return np.zeros(0), np.zeros((0, self.freedom)), np.zeros(0)

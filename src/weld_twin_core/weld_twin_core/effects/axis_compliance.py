@@ -13,14 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Shift
 from ..arm.dynamics import joint_moment
-from ..arm.robot import Robot
 from ..arm.vectors import dot
-from .effect import LinearEffect
-from .hooks import Hooked, SearchHooks, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Hooked, LinearEffect, SearchHooks, Traits, register
+from .view import Parameter, Robot, Shift, Stage, Value, View
 from .wording import turn
 
 

@@ -39,17 +39,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import last_true, play
 from .curves import load
-from .effect import Effect, LinearEffect, MemoryEffect
+from .effect import Effect, LinearEffect, MemoryEffect, register
 from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .joint_compliance import JointCompliance
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import size
 
 _FORMS = ('play', 'reversal', 'coast')

@@ -26,15 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import ModelError
-from .effect import LinearEffect
-from .hooks import Hooked, SearchHooks, Traits
+from .effect import Hooked, LinearEffect, SearchHooks, Traits, register
 from .pedestal_tilt import base_leans
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Array, Channel, Parameter, Robot, Shift, Stage, Value, View
 from .wording import turn
 
 

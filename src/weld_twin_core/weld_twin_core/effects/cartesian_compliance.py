@@ -6,14 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Shift
 from ..arm.dynamics import wrench_rotation
-from ..arm.robot import Robot
-from .effect import LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
-from .wording import number
+from .effect import LinearEffect, Traits, register
+from .view import Parameter, Robot, Shift, Stage, Value, View
+from .wording import numbers
 
 
 @register
@@ -55,6 +51,5 @@ class CartesianCompliance(LinearEffect):
         ]
 
     def remedy(self, robot: Robot) -> str:
-        values = np.asarray(self.compliance) * 1e5
-        each = ', '.join(number(float(v)) for v in values)
+        each = numbers(np.asarray(self.compliance) * 1e5)
         return f'Compensate the yielding of the tool: ({each}) mm per 100 N along its x, y, z.'

@@ -2,12 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The clock of the measurements against that of the joints: late, or running fast or slow."""
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from .effect import Effect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .effect import Effect, Traits, register
+from .view import Parameter, Robot, Shift, Stage, Value, View, single
 from .wording import size
 
 

@@ -10,16 +10,12 @@ from numbers import Real
 
 import numpy as np
 
-from ..arm.channels import ROW_CHANNELS, Channel, Shift
+from ..arm.channels import ROW_CHANNELS
 from ..arm.dynamics import chain_gravity_torque, wrench_torque
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..cubics import hermite, natural_slopes
 from ..errors import DataError, ModelError
-from .effect import Effect
-from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, register
+from .view import Array, Channel, Parameter, Robot, Shift, Stage, Value, View
 
 AT_REST = 2e-3
 """Speed [rad/s or m/s] at which the direction of motion counts for two thirds: some ten times the

@@ -18,16 +18,11 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..recording import Recording
-from .effect import Effect
+from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
 from .frame_errors import FrameError, frame_parameters
 from .geometry import ChannelError, JointOffset
-from .hooks import Hooked, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 from .wording import base_frame, frame, radians
 
 _TIMES = 40
@@ -36,7 +31,7 @@ _TIMES = 40
 T = TypeVar('T', bound='_Timed')
 
 
-class _Timed(Effect):
+class _Timed(LinearEffect):
     """A constant error times a share that hangs on the time, counted from the recording's epoch."""
 
     since: ClassVar[str] = 'time'
@@ -52,17 +47,10 @@ class _Timed(Effect):
         """Return the same with its instant counted from an epoch that is later by so much [s]."""
         return replace(self, **{self.since: getattr(self, self.since) - later})
 
-    def displace(self, view: View) -> Shift:
+    def per_unit(self, view: View) -> list[Shift]:
         share = self.share(view)
-        whole = super().displace(view)  # type: ignore[safe-super]
-        return {channel: value * share for channel, value in whole.items()}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        share = self.share(view)
-        return [
-            None if shift is None else {channel: value * share for channel, value in shift.items()}
-            for shift in super().gradient(view)
-        ]
+        whole = super().per_unit(view)  # type: ignore[safe-super]
+        return [{channel: value * share for channel, value in shift.items()} for shift in whole]
 
 
 class Sudden(_Timed):

@@ -4,13 +4,9 @@
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from .effect import LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
-from .wording import number
+from .effect import LinearEffect, Traits, register
+from .view import Parameter, Robot, Shift, Stage, Value, View
+from .wording import numbers
 
 
 @register
@@ -47,8 +43,7 @@ class Drift(LinearEffect):
         return [{('pose', k): view.elapsed} for k in range(3)]
 
     def remedy(self, robot: Robot) -> str:
-        rate = np.asarray(self.xyz_rate) * 3.6e6
-        each = ', '.join(number(float(v)) for v in rate)
+        each = numbers(np.asarray(self.xyz_rate) * 3.6e6)
         return (
             f'Find what creeps (fixture, tripod, pedestal): ({each}) mm per hour along x, y, z; '
             'measure a fixed point now and then.'

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
@@ -26,13 +26,22 @@ from .parametric import Parametric
 from .view import Parameter, Stage, Value, View
 from .wording import travel
 
-__all__ = ['Effect', 'LinearEffect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
+__all__ = ['REGISTRY', 'Effect', 'FitHooks', 'Hooked', 'LinearEffect', 'MemoryEffect', 'Parameter']
+__all__ += ['SearchHooks', 'Stage', 'Traits', 'TwinHooks', 'Value', 'View', 'register']
 
 _RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
 SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
 """Units of a joint that turns, and those in their place where it slides."""
+
+if TYPE_CHECKING:
+    from typing_extensions import dataclass_transform
+else:  # what tools see; at run time `register` makes the dataclass
+
+    def dataclass_transform(**_: bool) -> Any:
+        return lambda function: function
+
 
 E = TypeVar('E', bound='Effect')
 
@@ -313,3 +322,57 @@ class MemoryEffect(Effect):
     def push(self, view: View, tangent: Array) -> Array:
         """Return how a small change of the input joint position, shape (..., N), comes out."""
         return tangent
+
+
+REGISTRY: dict[str, type[Effect]] = {}
+"""By name, in the order of names."""
+
+
+@dataclass_transform(frozen_default=True, eq_default=False)
+def register(effect: type[E]) -> type[E]:
+    """
+    Make an effect known by its name, from this package or from user code.
+
+    Parameters
+    ----------
+    effect : subclass of Effect
+        Its fields become those of a frozen dataclass; its ``name`` is how effects files call it.
+
+    Returns
+    -------
+    The same class, so that this may be used as a decorator.
+
+    Raises
+    ------
+    ModelError
+        Another effect has that name, or the class does not keep the contract of its stage.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.register(wt.effects.Backlash) is wt.effects.Backlash
+    True
+
+    """
+    if '__dataclass_fields__' not in vars(effect):
+        effect = dataclass(frozen=True, eq=False)(effect)
+    known = REGISTRY.get(effect.name)
+    if known is not None and known.__qualname__ != effect.__qualname__:
+        raise ModelError(f'an effect named {effect.name!r} is registered already')
+    declared = {parameter.name for parameter in effect.parameters}
+    missing = sorted(declared - {item.name for item in fields(effect)})
+    if missing:
+        raise ModelError(f'effect {effect.name!r} declares {missing[0]!r} but has no such field')
+    if effect.stage in (Stage.SERVO, Stage.PLAY) and not issubclass(effect, MemoryEffect):
+        raise ModelError(
+            f'effect {effect.name!r} acts in stage {effect.stage.name}, which runs in order of '
+            'time; derive it from MemoryEffect'
+        )
+    if effect.stage == Stage.ELASTIC and 'compliance' not in declared:
+        raise ModelError(
+            f'effect {effect.name!r} is a spring in a joint; name its parameter compliance'
+        )
+    REGISTRY[effect.name] = effect
+    for name in sorted(REGISTRY):  # no answer may hang on which file was imported first
+        REGISTRY[name] = REGISTRY.pop(name)
+    return effect

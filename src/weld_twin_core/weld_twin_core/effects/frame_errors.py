@@ -9,15 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
 from ..arm.known_arms import controller_frames
-from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix, transform
-from ..arrays import Array
-from .effect import Effect
-from .hooks import Hooked, SearchHooks
-from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View, single
+from .effect import Hooked, LinearEffect, SearchHooks, register
+from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View, single
 from .wording import base_frame, controller_pose, frame
 
 
@@ -32,7 +27,7 @@ def frame_parameters(
 
 
 @dataclass(frozen=True, eq=False)
-class FrameError(Effect):
+class FrameError(LinearEffect):
     """A constant error of the base or tool frame: a displacement and a turn."""
 
     xyz: Value = (0.0, 0.0, 0.0)
@@ -42,14 +37,7 @@ class FrameError(Effect):
     of = 'robot'
     stage = Stage.LINK
 
-    def displace(self, view: View) -> Shift:
-        out: dict[Channel, Array] = {}
-        for k in range(3):
-            out |= single((self.channel, k), self.number('xyz', k), view)
-            out |= single((self.channel, k + 3), self.number('rotvec', k), view)
-        return out
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         return [single((self.channel, k), np.ones(()), view) for k in range(6)]
 
 

@@ -18,14 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from .associative_scan import last_true, play
-from .effect import Effect, LinearEffect, MemoryEffect
-from .hooks import Hooked, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .effect import Effect, Hooked, LinearEffect, MemoryEffect, Traits, TwinHooks, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View, single
 from .wording import number, size
 
 

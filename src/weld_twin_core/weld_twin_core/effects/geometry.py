@@ -15,11 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from .effect import Effect
-from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .effect import LinearEffect, register
+from .view import Parameter, Robot, Shift, Stage, Value, View, single
 from .wording import metres, radians, stands, to_mend
 
 _URS = (
@@ -30,7 +27,7 @@ _URS = (
 """Where errors of links were read."""
 
 
-class ChannelError(Effect):
+class ChannelError(LinearEffect):
     """A constant error of one channel of one joint or row; the parameter displaces it."""
 
     channel: ClassVar[str]
@@ -51,11 +48,7 @@ class ChannelError(Effect):
             f'{old}: {self.off} {by}.'
         )
 
-    def displace(self, view: View) -> Shift:
-        channel = (self.channel, view.robot.index(str(self.site)))
-        return single(channel, self.number(self.parameters[0].name), view)
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 

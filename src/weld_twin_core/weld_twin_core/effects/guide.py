@@ -14,15 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
-from ..arrays import Array
-from .effect import LinearEffect
-from .hooks import Hooked, SearchHooks, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
-from .wording import number, size
+from .effect import Hooked, LinearEffect, SearchHooks, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
+from .wording import numbers, size
 
 
 class _Search(SearchHooks):
@@ -52,11 +47,7 @@ def _carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
 
 
 def _displacement(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
-    """
-    Return how the pose moves where the carriage of joint i is slid or turned against its guide.
-
-    slide, turn: in the world, components first, shape (3, ...) [m, rad].
-    """
+    """Return how the pose moves where a carriage is slid or turned by (3, ...) in the world [m, rad]."""
     way = -1.0 if i < view.robot.behind else 1.0
     if turn is None:
         assert slide is not None
@@ -98,7 +89,7 @@ class GuideTilt(_GuideError):
         return [_displacement(view, i, None, view.joint(i) * axis) for axis in axes]
 
     def remedy(self, robot: Robot) -> str:
-        each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
+        each = numbers(np.degrees(self.rate))
         return (
             f'Level the guide of {self.site}: its carriage turns by ({each}) deg about x, y, z of '
             'its row on every metre; until then compensate the motion.'

@@ -21,20 +21,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Shift
 from ..arm.dynamics import point_force_torque, wrench_rotation
-from ..arm.robot import Robot
 from ..arm.vectors import components, pad
-from ..arrays import Array
-from .effect import Effect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
-from .wording import number
+from .effect import LinearEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
+from .wording import number, numbers
 
 
 @register
-class HosePull(Effect):
+class HosePull(LinearEffect):
     """The flange is pulled by ``force`` less ``stiffness`` times its place, in the base frame."""
 
     force: Value = (0.0, 0.0, 0.0)
@@ -68,24 +63,16 @@ class HosePull(Effect):
         ),
     )
 
-    def displace(self, view: View) -> Shift:
-        values = [*(self.number('force', k) for k in range(3)), self.number('stiffness')]
+    def per_unit(self, view: View) -> list[Shift]:
+        robot, chain = view.robot, view.frames
         flange, pulls = _pulls(view)
-        pairs = zip(values, pulls, strict=True)
-        force = sum((value * pad(pull, np.ndim(value)) for value, pull in pairs), np.zeros(()))
-        torque = point_force_torque(view.robot, view.frames, flange, force)
-        return {('tau', i): torque[i] for i in range(view.robot.n)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        flange, pulls = _pulls(view)
-        parts = [point_force_torque(view.robot, view.frames, flange, pull) for pull in pulls]
-        return [{('tau', i): part[i] for i in range(view.robot.n)} for part in parts]
+        parts = [point_force_torque(robot, chain, flange, pull) for pull in pulls]
+        return [{('tau', i): part[i] for i in range(robot.n)} for part in parts]
 
     def remedy(self, robot: Robot) -> str:
-        x, y, z = (float(part) for part in np.asarray(self.force))
         return (
-            f'Lead the hose package so that it hangs free: it pulls the flange by ({number(x)}, '
-            f'{number(y)}, {number(z)}) N along x, y, z of the base, less '
+            'Lead the hose package so that it hangs free: it pulls the flange by '
+            f'({numbers(self.force)}) N along x, y, z of the base, less '
             f'{number(self._plain("stiffness"))} N for every metre away from it.'
         )
 

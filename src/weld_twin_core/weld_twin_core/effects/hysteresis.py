@@ -25,14 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
-from .effect import Effect, MemoryEffect
-from .hooks import FitHooks, Hooked, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, MemoryEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
 SHORTEST, LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""

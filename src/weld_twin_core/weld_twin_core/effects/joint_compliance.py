@@ -19,14 +19,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import STANDARD_GRAVITY, Robot
-from ..arrays import Array
+from ..arm.robot import STANDARD_GRAVITY
 from ..errors import DataError, ModelError
-from .effect import Effect, LinearEffect
-from .hooks import Hooked, SearchHooks, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .effect import Effect, Hooked, LinearEffect, SearchHooks, Traits, TwinHooks, register
+from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 from .wording import metres, radians, size
 
 SOFTEST = 3e-4

@@ -10,15 +10,10 @@ from itertools import combinations
 import numpy as np
 
 from ..arm.chain import frames
-from ..arm.channels import Shift
-from ..arm.robot import Robot
 from ..arm.vectors import cross, dot
-from ..arrays import Array
 from ..errors import ModelError
-from .effect import Effect, LinearEffect
-from .hooks import Hooked, SearchHooks, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, Hooked, LinearEffect, SearchHooks, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _POSTURES = np.array([0.4, 1.0])

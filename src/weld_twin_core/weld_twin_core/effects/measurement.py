@@ -12,13 +12,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import Effect, LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, LinearEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 
@@ -83,9 +78,6 @@ class MeasurementNoise(Effect):
     def displace(self, view: View) -> Shift:
         """Return nothing: the expected error is zero."""
         return {}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        return [None]
 
     def draw(self, samples: int, rng: np.random.Generator) -> Array:
         """Return errors of measured positions, shape (samples, 3) [m]."""

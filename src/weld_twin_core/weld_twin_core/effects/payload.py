@@ -6,15 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Shift
 from ..arm.dynamics import payload_slope, payload_torque
-from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import Effect
-from .hooks import Hooked, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
-from .wording import number
+from .effect import Effect, Hooked, Traits, TwinHooks, register
+from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
+from .wording import number, numbers
 
 _OWN_WEIGHT = 0.5
 """Share of its own weight that no arm carries; those of welding carry a tenth to a third."""
@@ -25,11 +20,7 @@ _UNSTATED_MASS = 20.0
 
 
 def mass_range(robot: Robot) -> tuple[float, float]:
-    """
-    Return how much less and more than declared a payload can weigh, [kg].
-
-    A load cannot weigh less than nothing, and no arm carries half of what it weighs itself.
-    """
+    """Return how much less and more than declared a payload can weigh [kg]."""
     own = _UNSTATED_MASS / _OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
     return -robot.payload_mass - _BELOW * own, _OWN_WEIGHT * own - robot.payload_mass
 
@@ -104,8 +95,7 @@ class Payload(Effect):
 
     def remedy(self, robot: Robot) -> str:
         extra = self._plain('mass')
-        com = np.asarray(self.com) * 1e3
-        where = ', '.join(number(float(v)) for v in com)
+        where = numbers(np.asarray(self.com) * 1e3)
         return (
             f'Enter a payload of {robot.payload_mass + extra:.2f} kg in place of '
             f'{robot.payload_mass:.2f} kg; the {number(extra)} kg lie at ({where}) mm in the tool '

@@ -15,15 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
 from ..arm.dynamics import base_moment, wrench_rotation
-from ..arm.robot import Robot
 from ..arm.vectors import components, dot, pad
-from ..arrays import Array
-from .effect import LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import LinearEffect, Traits, register
+from .view import Array, Channel, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _CHANGED = 1e-6

@@ -8,13 +8,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import Effect
-from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
@@ -108,10 +103,6 @@ class Quantization(Effect):
         safe = np.where(step > 0.0, step, 1.0)
         error = safe * np.rint(self._theta(view) / safe) - self._theta(view)
         return self._moves(view, np.where(step > 0.0, error, 0.0))
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return None: the staircase jumps with its step."""
-        return [None]
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:

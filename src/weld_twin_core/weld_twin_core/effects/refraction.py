@@ -22,14 +22,10 @@ from numbers import Real
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
 from ..errors import ModelError
-from .effect import LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
-from .wording import number
+from .effect import LinearEffect, Traits, register
+from .view import Parameter, Robot, Shift, Stage, Value, View
+from .wording import numbers
 
 _BEND = 7.86e-4 * 101.325 / 293.15**2
 """By how much the refractive index of air falls [1/K], 9.27e-7 at 20 degC and 101.325 kPa:
@@ -110,8 +106,7 @@ class Refraction(LinearEffect):
         return super().applicable(view, joint)
 
     def remedy(self, robot: Robot) -> str:
-        each = ', '.join(number(float(v)) for v in np.asarray(self.warming))
         return (
             'Stir the air along the line of sight, shield it from heat or stand the instrument '
-            f'nearer: the air warms by ({each}) K/m along x, y, z and bends it.'
+            f'nearer: the air warms by ({numbers(self.warming)}) K/m along x, y, z and bends it.'
         )

@@ -18,15 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import linear
-from .effect import MemoryEffect
-from .hooks import FitHooks, Hooked, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import FitHooks, Hooked, MemoryEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import size
 
 _DAMPINGS = (0.3, 0.4, 0.55, 0.75)

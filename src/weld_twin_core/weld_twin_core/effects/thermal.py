@@ -16,14 +16,9 @@ from numbers import Real
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import DataError, ModelError
-from .effect import Effect, LinearEffect
-from .hooks import FitHooks, Hooked, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, LinearEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 

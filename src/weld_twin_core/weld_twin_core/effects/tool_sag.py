@@ -14,13 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import LinearEffect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import LinearEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _TURNED = 1e-2

@@ -10,15 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
-from .effect import Effect
-from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks, Waves, highest_order
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, register
+from .hooks import Waves, highest_order
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import size
 
 _MAX_ORDER = 100
@@ -39,7 +35,7 @@ class _Twin(TwinHooks):
 
     def slope(self, view: View) -> Shift:
         total = _sum(a * n * np.cos(angle) for a, n, angle in self.effect._terms(view))
-        return {('q', view.robot.index(self.effect.joint)): total}
+        return self.effect._moves(view, total)
 
 
 class _Search(SearchHooks):
@@ -172,9 +168,8 @@ class TransmissionRipple(Effect):
 
     def displace(self, view: View) -> Shift:
         if self._dense():
-            return {('q', view.robot.index(self.joint)): self._all_orders(view)}
-        total = _sum(a * np.sin(angle) for a, _, angle in self._terms(view))
-        return {('q', view.robot.index(self.joint)): total}
+            return self._moves(view, self._all_orders(view))
+        return self._moves(view, _sum(a * np.sin(angle) for a, _, angle in self._terms(view)))
 
     def _dense(self) -> bool:
         """Return whether there are so many whole orders that powers are quicker than sines."""
@@ -198,11 +193,10 @@ class TransmissionRipple(Effect):
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d/d amplitude of every order, None for the orders, d/d phase of every order."""
-        channel = ('q', view.robot.index(self.joint))
         terms = list(self._terms(view))
-        amplitude: list[Shift | None] = [{channel: np.sin(angle)} for _, _, angle in terms]
-        phase: list[Shift | None] = [{channel: a * np.cos(angle)} for a, _, angle in terms]
-        return amplitude + [None] * len(terms) + phase
+        amplitude: list[Shift | None] = [self._moves(view, np.sin(angle)) for _, _, angle in terms]
+        phase = [self._moves(view, a * np.cos(angle)) for a, _, angle in terms]
+        return [*amplitude, *[None] * len(terms), *phase]
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
@@ -212,16 +206,15 @@ class TransmissionRipple(Effect):
 
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""
-        channel = ('q', view.robot.index(self.joint))
-        theta = view.joint(channel[1])
-        if self._dense():
-            turn, now, powers = np.exp(1j * theta), np.ones_like(theta, complex), {}
-            for n in range(1, int(self.search.orders().max()) + 1):
-                now = now * turn
-                powers[n] = now
-            waves = [powers[int(n)] for n in self.search.orders()]
-            return [{channel: part} for wave in waves for part in (wave.imag, wave.real)]
-        return [{channel: f(n * theta)} for n in self.search.orders() for f in (np.sin, np.cos)]
+        theta, orders = self._theta(view), self.search.orders()
+        if not self._dense():
+            return [self._moves(view, f(n * theta)) for n in orders for f in (np.sin, np.cos)]
+        turn, now, powers = np.exp(1j * theta), np.ones_like(theta, complex), {}
+        for n in range(1, int(orders.max()) + 1):
+            now = now * turn
+            powers[n] = now
+        waves = [powers[int(n)] for n in orders]
+        return [self._moves(view, part) for wave in waves for part in (wave.imag, wave.real)]
 
     def from_atoms(self, coefficients: Array) -> TransmissionRipple:
         """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""

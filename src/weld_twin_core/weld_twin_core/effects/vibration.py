@@ -14,14 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
 from .associative_scan import linear
-from .effect import Effect, MemoryEffect
-from .hooks import FitHooks, Hooked, Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, FitHooks, Hooked, MemoryEffect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
 _FREQUENCIES = np.geomspace(1.0, 40.0, 64)
 """Modes [Hz] that a fit may start from, and"""
@@ -99,8 +94,10 @@ class Vibration(MemoryEffect):
         damped = w * np.sqrt(1.0 - self.number('damping') ** 2)
         return -self.number('damping') * w + 1j * damped, damped
 
-    def _kicks(self, view: View, q: Array, state: Any) -> tuple[Array, Array, Any]:
-        """Return the steps in time, the jump of velocity before each, and what to carry."""
+    def _response(
+        self, view: View, q: Array, state: Any = None
+    ) -> tuple[Array, Array, Array, Array, Any]:
+        """Return the response z of gain 1 to motion, its decay, steps and kicks, and the state."""
         rest = np.zeros(q.shape[:-1], complex)
         # The velocity before the first step is not known; NaN marks it, and it kicks nothing.
         start = (view.t[0], q[..., 0], np.full(q.shape[:-1], np.nan), rest)
@@ -110,17 +107,10 @@ class Vibration(MemoryEffect):
         before = np.asarray(rate0)[..., None]
         rate = np.where(dt > 0.0, change / np.where(dt > 0.0, dt, 1.0), before)
         kick = np.nan_to_num(np.diff(rate, axis=-1, prepend=before))
-        return dt, kick, (view.t[-1], q[..., -1], rate[..., -1], z0)
-
-    def _response(
-        self, view: View, q: Array, state: Any = None
-    ) -> tuple[Array, Array, Array, Array, Any]:
-        """Return the response z of gain 1 to motion, its decay, steps and kicks, and the state."""
-        dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
         z = linear(decay, -decay * kick / damped, z0)
-        return z, decay, dt, kick, (t, last, rate, z[..., -1])
+        return z, decay, dt, kick, (view.t[-1], q[..., -1], rate[..., -1], z[..., -1])
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         if view.static:

@@ -17,6 +17,9 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 
+__all__ = ['Array', 'Channel', 'Parameter', 'Plausible', 'Robot', 'Shift', 'Stage', 'Value']
+__all__ += ['View', 'single']
+
 Value = Any
 """A parameter: a number, a list of numbers, or the same with a leading axis of draws."""
 

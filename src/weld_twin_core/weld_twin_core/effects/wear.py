@@ -11,13 +11,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..arm.channels import Shift
-from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import Effect
-from .hooks import Traits
-from .registry import register
-from .view import Parameter, Stage, Value, View
+from .effect import Effect, Traits, register
+from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _SLOWED = (0.0, 0.5)

@@ -9,6 +9,7 @@ Where a joint stands at a reading, and what its zero has to become, is said here
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Array
 
@@ -32,6 +33,11 @@ def number(value: float, digits: int = 3) -> str:
         return '0'
     places = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
     return f'{value:+.{min(places, 9)}f}'
+
+
+def numbers(values: ArrayLike) -> str:
+    """Return signed numbers (K,) as a list in words; see `number`."""
+    return ', '.join(number(float(value)) for value in np.asarray(values))
 
 
 def size(value: float, digits: int = 3) -> str:
@@ -61,11 +67,7 @@ def travel(value: float, *, sliding: bool) -> str:
 
 
 def frame(step: Array, shifted: str, turned: str) -> str:
-    """
-    Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees.
-
-    shifted, turned: whose axes they are along and about, such as 'of the measuring frame'.
-    """
+    """Return a step (6,) [m, rad] of a frame in mm and degrees, along and about whose axes."""
     moved = _axes(np.asarray(step[:3]) * 1e3, _LEAST_MM, 'mm along', 3)
     about = _axes(np.degrees(step[3:]), _LEAST_DEG, 'deg about', 4)
     parts = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']

@@ -165,12 +165,7 @@ class _Look(NamedTuple):
         return _described(self.series, system, self.shapes, gain, best, self.sooner, scatter)
 
     def settled(self, taken: Sequence[tuple[Term, Change]]) -> list[tuple[Term, Change]]:
-        """
-        Return the changes, each looked for once more beside all others.
-
-        The first was found while nothing else was known: a step may have stood for a trend. What
-        is no more than chance beside the others goes.
-        """
+        """Return the changes that are more than chance, each looked for once more beside all others."""
         if len(taken) < 2:
             return list(taken)
         out: list[tuple[Term, Change]] = []
@@ -225,11 +220,7 @@ class _System:
 
     @cached_property
     def scatter(self) -> float:
-        """
-        Return by how much diagnoses scatter more than they say, at least 1.
-
-        The median over the diagnoses, so that one that is off does not hide a change.
-        """
+        """Return by how much diagnoses scatter more than they say, at least 1: the median over them."""
         series, count = self._series, len(self._series.names)
         ratios = []
         for w, (own, whitening) in enumerate(series.whitening):
@@ -333,12 +324,7 @@ def _described(
     sooner: Array,
     scatter: float,
 ) -> tuple[Term, Change]:
-    """
-    Return the simplest change that explains as much as the best, and what else would.
-
-    Of coordinates that explain equally much, the one that need not do what it hardly ever does:
-    the size is weighed by what was believed of the coordinate before the data.
-    """
+    """Return the simplest change that explains as much as the best by its prior, and what else would."""
     kind, top = shapes[best[0]].kind, gain[best]
     same = [k for k, each in enumerate(shapes) if each.kind == kind]
     most = gain[same].max(axis=0)

@@ -33,12 +33,7 @@ class Outlook(NamedTuple):
 def outlook(
     observations: Sequence[Observation], result: Sequence[Change], name: str
 ) -> Outlook | None:
-    """
-    Return where a coordinate is and how fast it moves; None if it has no trend.
-
-    All diagnoses are fitted together with what `changes` found, so that value and rise have one
-    covariance.
-    """
+    """Return where a coordinate is and how fast it moves, all fitted together; None without a trend."""
     if not any(each.name == name and each.kind == 'trend' for each in result):
         return None
     return Outlook(*value_and_rise(observations, result, name))

@@ -24,11 +24,7 @@ that do not name it: it would have been named beyond."""
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """
-    One diagnosis: values of coordinates, and how sure they are.
-
-    Raises DataError: the shapes do not agree, a name comes twice, or a number is not finite.
-    """
+    """One diagnosis: values of coordinates, and how sure they are; DataError where they do not agree."""
 
     day: float
     """When it was recorded [days]; the zero is the same for all."""
@@ -59,11 +55,7 @@ class Observation:
             object.__setattr__(self, name, readonly(getattr(self, name), shape, name))
 
     def information(self) -> tuple[Array, Array]:
-        """
-        Return what the data alone say: precision, (P, P), and precision times value, (P,).
-
-        The prior is taken out again, else every diagnosis would repeat it.
-        """
+        """Return the data's precision (P, P), and that times value (P,), without the prior."""
         return self._information
 
     @cached_property

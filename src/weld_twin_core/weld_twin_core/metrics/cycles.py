@@ -232,11 +232,7 @@ class PathCycles:
 
 
 def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
-    """
-    Return the cycles of the path that is repeated for most of the time; None where none is.
-
-    Raises DataError: nothing was measured.
-    """
+    """Return the cycles of the path repeated for most of the time, or None; DataError unmeasured."""
     measured, joints = measured_of(recording), recording.joints
     if joints.static or joints.t.size < 3:
         return None

@@ -112,11 +112,7 @@ class Performance:
 
 
 def performance_of(recording: Recording, robot: Robot) -> Performance:
-    """
-    Return pose and path criteria of the cycles found in a recording of a robot that is placed.
-
-    Raises DataError: nothing was measured, or neither a pose nor a path is repeated.
-    """
+    """Return the criteria of cycles that a placed robot's recording repeats; DataError for none."""
     groups = pose_cycles(stops(recording), robot)
     poses = tuple(_pose_test(group) for group in groups if group.t.size > 1)
     cycles = path_cycles(recording, robot)

@@ -44,11 +44,7 @@ def path_tangents(position: ArrayLike) -> Array:
 
 
 def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
-    """
-    Return seam axes as rows along, across, normal, shape (..., 3, 3); DataError for none.
-
-    The normal (..., 3) is made square to the tangent; their lengths do not matter.
-    """
+    """Return rows along, across, normal made square, shape (..., 3, 3); DataError for none."""
     along, normal = np.broadcast_arrays(
         np.asarray(tangent, dtype=np.float64), np.asarray(normal, dtype=np.float64)
     )

@@ -78,12 +78,7 @@ class Remembered:
 
     @cached_property
     def table(self) -> tuple[Array, Array] | None:
-        """
-        Return values of the one tolerance (B,) and what the slope leaves there (B, N).
-
-        Between them it is straight, as play is in its width. None where there are several
-        tolerances, or too many bends.
-        """
+        """Return the one tolerance's values (B,) and rests (B, N), straight between, if few bends do."""
         if len(self.columns) != 1:
             return None
         ends = self.tolerances[0].distribution.values([0.0, 1.0])
@@ -122,11 +117,7 @@ def _somewhere(values: Array) -> NDArray[np.intp]:
 def _straight_between(
     function: Callable[[Array], Array], low: float, high: float
 ) -> tuple[Array, Array] | None:
-    """
-    Return knots (B,) and a function's values there (B, N), straight between them to `_STRAIGHT`.
-
-    Steps are halved where the middle is off the straight line; None where that takes too many.
-    """
+    """Return knots (B,) and values (B, N), straight between to `_STRAIGHT`; None for too many."""
     knots = np.linspace(low, high, _COARSE + 1)
     values = function(knots)
     first = np.arange(_COARSE)

@@ -61,11 +61,7 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
 
 
 def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
-    """
-    Return how much further than its reading every joint stands, shape (n,) [rad or m].
-
-    A controller that keeps its own offsets adds it to the reading.
-    """
+    """Return how much further than its reading each joint stands, (n,), as controllers add it."""
     out = np.zeros(robot.n)
     for effect in effects:
         if isinstance(effect, ChannelError) and effect.channel == 'q':

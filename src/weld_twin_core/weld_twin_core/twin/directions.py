@@ -69,12 +69,7 @@ class Directions:
         return self.gives + sum(k.size for k in self.knots)
 
     def names(self) -> list[str]:
-        """
-        Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'.
-
-        Waves are named by their order and curves by their place, so that a name means the same in
-        every diagnosis of an arm.
-        """
+        """Return the coordinates' names, alike in every diagnosis: 'joint_offset elbow_joint 0'."""
         out = []
         if 'base' in self.frames:
             out += [f'base {k}.{axis}' for k in range(self.setups) for axis in AXES]
@@ -101,11 +96,7 @@ class Directions:
         return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(self.shapes)])
 
     def columns(self, features: Features, setup: int) -> Array:
-        """
-        Return d pose / d coordinate, shape (P, 6, M), linear part first [m, rad].
-
-        Effects that the recording cannot show (no load, no temperature) have columns of zero.
-        """
+        """Return d pose / d coordinate (P, 6, M) [m, rad]; zero where the recording shows none."""
         out = np.zeros((self.count, 6, features.at.size))
         at = 0
         if 'base' in self.frames:

@@ -102,13 +102,7 @@ class Domain:
         )
 
     def beyond(self, q: Array) -> Array:
-        """
-        Return how far every joint is from where it was measured, shape (M, n) [rad or m].
-
-        Angles count modulo a full turn.
-
-        q: shape (M, n).
-        """
+        """Return how far joints (M, n) are from where they were measured, angles modulo a full turn."""
         out = np.empty(q.shape)
         for i, intervals in enumerate(self.ranges):
             low, high = np.array(intervals).T
@@ -314,11 +308,7 @@ def _measured(recording: Recording) -> tuple[Array, Array]:
 
 
 def _gaps(q: Array) -> Array:
-    """
-    Return how far a joint may be from where it was and still count as recorded there, (n,).
-
-    From each measurement left out in turn: how far its joints are from the nearest of the others.
-    """
+    """Return how far joints may be and still count as recorded (n,), by leaving out each in turn."""
     span = np.maximum(np.ptp(q, axis=0), 1e-9)
     order = np.argsort(q, axis=0)
     steps = np.diff(np.take_along_axis(q, order, axis=0), axis=0)

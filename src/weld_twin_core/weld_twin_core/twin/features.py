@@ -152,12 +152,7 @@ class Features:
     def seeds(
         self, kind: type[Effect], joint: str | None, pull: Array | None = None
     ) -> tuple[list[Effect], float]:
-        """
-        Return the instances a search for this kind starts from, and among how many.
-
-        The joint is None for the robot as a whole; what is to be explained pulls at it, shape
-        (M,).
-        """
+        """Return what a search on a joint, or None, starts from by its pull (M,), and among how many."""
         view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
         seeds = list(kind.seeds(view, joint, pull))
         return seeds, kind.search.trials(view, joint) or float(len(seeds))

@@ -30,12 +30,7 @@ class Goal(NamedTuple):
     """Accelerations only where there are velocities, shape (N, n) [per s, per s^2]."""
 
     def checked(self, joints: int) -> Goal:
-        """
-        Return the goal as finite arrays of their shapes.
-
-        Raises DataError: there is no point, a shape or a number is wrong, or the times do not
-        increase.
-        """
+        """Return the goal as finite arrays, its times increasing; DataError where it is none."""
         t = readonly(self.t, (None,), 'time_from_start')
         if t.size == 0:
             raise DataError('the goal has no point')

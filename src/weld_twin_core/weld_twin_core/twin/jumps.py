@@ -16,11 +16,7 @@ from .features import Features
 
 
 def jumps(features: Features) -> Array:
-    """
-    Return by how much effects jump from each sample of a motion to the next, shape (M - 1, 3) [m].
-
-    No rows where nothing jumps.
-    """
+    """Return how far effects jump from sample to sample, (M - 1, 3) [m]; no rows where nothing jumps."""
     jumping = [e for e in features.twin.effects if e.traits.jumps]
     if not jumping or features.recording.joints.static or features.at.size < 2:
         return np.zeros((0, 3))
@@ -33,10 +29,6 @@ def jumps(features: Features) -> Array:
 
 
 def shown(features: Features, noise: float) -> float:
-    """
-    Return how many jumps a recording shows; one below the noise counts for as little as it shows.
-
-    noise: standard deviation of a measured coordinate [m].
-    """
+    """Return how many jumps a recording shows, those below a coordinate's noise [m] for less."""
     power = (jumps(features) ** 2).sum(axis=1) / (3.0 * noise**2)
     return float(np.minimum(power, 1.0).sum())

@@ -155,11 +155,7 @@ class PoseCorrection:
         self._reach = float(np.clip(best, _REACH[0], _REACH[2]))
 
     def added(self, pose: Array) -> tuple[Array, float]:
-        """
-        Return what is to be added to a pose (4, 4), (6,) [m, rad], and how far the latest look is.
-
-        That is in units of how far it may be.
-        """
+        """Return what is added to a pose (6,) [m, rad], and how far the look is, over its reach."""
         assert self._at is not None
         way, size = _away(self._at, pose)
         onward = _onward(self._way, way)

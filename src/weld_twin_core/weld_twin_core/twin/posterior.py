@@ -104,11 +104,7 @@ class Posterior:
 
     @cached_property
     def factor(self) -> Array:
-        """
-        Return a factor S, shape (P, R), with S S' the covariance.
-
-        Raises DataError: a variance is negative.
-        """
+        """Return a factor S (P, R) with S S' the covariance; DataError where a variance is negative."""
         size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
         # At unit size, so that metres and radians, open and settled coordinates weigh alike.
@@ -252,12 +248,7 @@ class Posterior:
         return (*effects, *waves, *others), centred
 
     def after(self, features: Features, noise: float) -> Posterior:
-        """
-        Return how sure a model will be once its poses were measured too, and it was fitted anew.
-
-        features: of the stations, in the set-up that was recorded.
-        noise: standard deviation of a measured coordinate [m].
-        """
+        """Return how sure a model fitted anew will be, poses measured with a coordinate's noise [m]."""
         columns = self._columns(features, 0)[:, :3].transpose(0, 2, 1)
         own = self.discrepancy.covariance(self._where(features))[:, :3, :3]
         count = own.shape[0]
@@ -319,13 +310,7 @@ class Posterior:
         return off * rest.grown(here)[:, None, None, None]
 
     def at_rest(self, twin: Twin, q: Array) -> Recording:
-        """
-        Return stations as warm as what was recorded, with nothing on the tool.
-
-        Springs that go by measured efforts take those that the model's statics expect.
-
-        q: shape (M, n).
-        """
+        """Return stations (M, n) as warm as recorded, without a load, with the efforts to expect."""
         t, warm = np.arange(float(len(q))), self.domain.temperature
         stations = Recording(
             'stations',
@@ -422,13 +407,7 @@ def pose_covariances(
     at: Array,
     setup: int = 0,
 ) -> Array:
-    """
-    Return `Posterior.pose_covariance` of a long motion, shape (M, 6, 6), in pieces.
-
-    twin: the fitted model for this recording.
-    at: shape (M,) [s].
-    setup: which base frame of the posterior.
-    """
+    """Return `Posterior.pose_covariance` of a long motion at stamps (M,) [s], in pieces, (M, 6, 6)."""
     parts = [
         posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
     ]
@@ -438,11 +417,7 @@ def pose_covariances(
 def expected_poses(
     posterior: Posterior, twin: Twin, recording: Recording, at: Array, setup: int = 0
 ) -> tuple[Poses, Array]:
-    """
-    Return where `Posterior.expected` has the tool on a long motion, and the covariance about it.
-
-    twin, at, setup: as `pose_covariances` takes them.
-    """
+    """Return where `Posterior.expected` has the tool at stamps of a long motion, and the covariance."""
     parts = [posterior.expected(Features(twin, recording, piece), setup) for piece in _pieces(at)]
     shift = np.concatenate([np.zeros((0, 6)), *(part.shift for part in parts)])
     covariance = np.concatenate([np.zeros((0, 6, 6)), *(part.covariance for part in parts)])
@@ -455,11 +430,7 @@ def _pieces(at: Array) -> Iterator[Array]:
 
 
 def usual_sigma(posterior: Posterior, twin: Twin, q: Array) -> float:
-    """
-    Return the median of `largest_sigma` over postures at rest [m].
-
-    q: shape (M, n).
-    """
+    """Return the median of `largest_sigma` over postures at rest (M, n) [m]."""
     still = posterior.at_rest(twin, q)
     return float(
         np.median(largest_sigma(pose_covariances(posterior, twin, still, still.joints.t)))

@@ -58,11 +58,7 @@ class Accuracy(NamedTuple):
 
 
 def conforms(probability: float) -> str:
-    """
-    Return 'kept', 'not kept' or 'open' as ISO 14253-1 decides with a probability of conformity.
-
-    Within the guard band neither conformity nor the contrary is proven.
-    """
+    """Return 'kept', 'not kept' or, within the guard band of ISO 14253-1, 'open' by a probability."""
     if probability >= SURE:
         return 'kept'
     return 'not kept' if probability <= 1.0 - SURE else 'open'

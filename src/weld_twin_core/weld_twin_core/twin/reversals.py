@@ -80,11 +80,7 @@ def approached(recording: Recording, came: Array | None, stands: Array | None = 
 def play_steps(
     robot: Robot, plays: tuple[Effect, ...], recording: Recording, came: Array | None
 ) -> Array:
-    """
-    Return what takes play away at every sample, as steps, shape (K, n) [rad or m].
-
-    The recording is the motion that the joints are to make behind the gaps; see `approached`.
-    """
+    """Return what takes play away, as steps (K, n) [rad or m], of the motion wanted behind the gaps."""
     motion = recording.joints
     steps = np.zeros_like(motion.q)
     for _ in range(ROUNDS):
@@ -164,11 +160,7 @@ _BACK = 1e-5
 
 
 def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
-    """
-    Return whether joints turned around less than `_TAKEN_UP` before stamps (M,) [s], shape (M, n).
-
-    Nothing has turned at rest at stations, or before a first turn.
-    """
+    """Return whether moving joints turned less than `_TAKEN_UP` before stamps (M,) [s], shape (M, n)."""
     out = np.zeros((at.size, motion.q.shape[1]), dtype=bool)
     if motion.static:
         return out

@@ -126,12 +126,7 @@ class EffectStages:
         return view.displaced(torque, keep_frames=True).displaced(*give, keep_frames=not springs)
 
     def yielding(self, view: View) -> Array | None:
-        """
-        Return how joints before the springs move those behind, shape (n, n, ...); None if alike.
-
-        (1 - C dtau/dq)^-1, the derivative of q = theta + C tau(q) by theta, of a view behind all
-        stages.
-        """
+        """Return d q / d theta where springs settle: (1 - C dtau/dq)^-1, (n, n, ...); else None."""
         springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.twin.settles]
         if not springs:
             return None

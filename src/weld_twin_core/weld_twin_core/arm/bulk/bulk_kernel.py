@@ -74,12 +74,7 @@ class BulkKernel:
         self._memory: dict[int, _Memory] = {}
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
-        """
-        Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n) [rad or m].
-
-        Raises ModelError: a shape is wrong, or ``out``, where they are written to, is not
-        contiguous.
-        """
+        """Return tool poses (N, 4, 4) of joints (N, n), in ``out`` if given; ModelError for shapes."""
         out = self._poses_like(q, out)
         with unbuffered():
             for part in self._blocks(len(q)):
@@ -134,11 +129,7 @@ class BulkKernel:
         return [slice(start, start + size) for start in starts]
 
     def _pose_block(self, q: Array, out: Array, screws: Array | None = None) -> _Memory:
-        """
-        Write poses; if screws are wanted leave what they are made of in memory and in their place.
-
-        In the place of near screws that is the moment about the origin and the axis.
-        """
+        """Write poses; if wanted, leave screws in memory and, of near ones, moment and axis in place."""
         n = len(q)
         if n not in self._memory:
             if len(self._memory) == LENGTHS:

@@ -119,12 +119,7 @@ class Division:
         return out
 
     def _in_tool(self, place: _Place) -> Array:
-        """
-        Return the matrix of a screw that stands still in the tool.
-
-        A joint's own turn or slide commutes with a turn about its axis, so the value may as well
-        act behind it.
-        """
+        """Return the matrix of a screw still in the tool: it may as well act behind the joint."""
         after = np.eye(4)
         for factor in self._factors[max(place.before, self._moving[-1] + 1) :]:
             after = after @ factor.matrices[0]

@@ -129,11 +129,7 @@ class Piece:
         return _product(self._upto[-1], self._onward[-1])
 
     def velocities(self, turns: Sequence[tuple[int, int]]) -> Array:
-        """
-        Return weights of velocity and axis before the piece, (features, turns, 2, 3).
-
-        A turn is that of a coordinate axis before one of the factors.
-        """
+        """Return weights of velocity and axis by turns before factors, (features, turns, 2, 3)."""
         out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
             turned = self._upto[k] @ generator(axis)

@@ -66,11 +66,7 @@ def family(robot: Robot) -> str | None:
 
 
 def branches(robot: Robot, poses: Array) -> Array:
-    """
-    Return all branches, shape (8, N, 6) [rad], NaN where a branch does not reach a pose (N, 4, 4).
-
-    The index of a branch means the same arm posture at every sample. Angles are in (-pi, pi].
-    """
+    """Return all branches (8, N, 6) [rad], one posture each, NaN where one does not reach a pose."""
     arm = _screws(robot)
     solver = _SOLVERS[str(family(robot))]
     rotation = poses[:, :3, :3] @ arm.home[:3, :3].T
@@ -204,11 +200,7 @@ def _angle_onto(axis: Array, start: Array, end: Array) -> Array:
 
 
 def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
-    """
-    Return both angles about an axis at which a turned vector has a component, (2, ...) [rad].
-
-    The component counts along ``along`` (..., 3), in units of its length.
-    """
+    """Return both angles (2, ...) [rad] at which a turned vector has a component along another."""
     level = (start @ axis)[..., None] * axis
     cosine = ((start - level) * along).sum(axis=-1)
     sine = (_cross(axis, start) * along).sum(axis=-1)

@@ -43,12 +43,7 @@ def distances(first: Array, second: Array) -> tuple[Array, Array]:
 
 
 def joined(tracks: Array) -> Array:
-    """
-    Return branches, shape (K, N, n), continued across singularities.
-
-    Where an arm passes a singularity, its motion goes on in what a closed form calls another
-    branch; there the branches change places.
-    """
+    """Return branches (K, N, n) that change places where an arm passes a singularity onto another."""
     tracks = tracks.copy()
     steps = np.abs(wrapped(np.diff(tracks, axis=1))).max(axis=-1)
     for i in np.flatnonzero((steps > LEAP).any(axis=0)) + 1:

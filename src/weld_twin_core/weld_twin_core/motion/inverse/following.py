@@ -82,11 +82,7 @@ def _piece(kernel: BulkKernel, poses: Array, start: Array) -> Array | None:
 
 @lru_cache(maxsize=16)
 def _knots(count: int) -> tuple[NDArray[np.intp], Array]:
-    """
-    Return which samples are knots, and the matrix (N, K) from values there to values everywhere.
-
-    The knots are nearest the extrema of a Chebyshev polynomial; the matrix is that of [1]_.
-    """
+    """Return which samples are knots, nearest Chebyshev's, and the matrix (N, K) to all others [1]_."""
     part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _KNOTS))
     index = np.unique(np.rint(part * (count - 1)).astype(int))
     apart = (index[:, None] - index) * (4.0 / count)

@@ -33,11 +33,7 @@ def pose_error(chain: Frames, poses: Array) -> Array:
 
 
 def least_step(slope: Array, error: Array, damping: Array | float = _FLOOR) -> Array:
-    """
-    Return the smallest joint steps (..., n) that take pose errors (..., 6) [m, rad] away.
-
-    The damping (...) [m^2] keeps them finite near a singularity.
-    """
+    """Return the smallest steps (..., n) that take errors (..., 6) [m, rad] away, damped (...) [m^2]."""
     transposed = np.swapaxes(slope, -1, -2)
     some = np.asarray(damping)[..., None, None] * np.eye(slope.shape[-2])
     square = slope @ transposed + some
@@ -65,11 +61,7 @@ def polish(robot: Robot, q: Array, poses: Array) -> tuple[Array, Array]:
 
 
 def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """
-    Return postures (M, n) near starts with tool points at points (M, 3) [m], and which are there.
-
-    Limits of the joints are not looked at.
-    """
+    """Return postures (M, n) near starts, tool points at (M, 3) [m], and which are there; no limits."""
     q = np.array(start)
     for _ in range(_ROUNDS):
         off = points - forward(robot, q)[:, :3, 3]

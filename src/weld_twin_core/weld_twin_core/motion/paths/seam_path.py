@@ -72,11 +72,7 @@ def positive(value: object, name: str) -> float:
 
 
 def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
-    """
-    Return frames with the part of a normal (3,) or (N, 3) that is perpendicular to the travel.
-
-    Raises PathError: somewhere the normal lies along the seam.
-    """
+    """Return frames with a normal (N, 3) made square to the travel; PathError where it lies along."""
     flat = normal - (normal * tangent).sum(axis=-1, keepdims=True) * tangent
     size = np.linalg.norm(flat, axis=-1, keepdims=True)
     if (size < 1e-6).any():

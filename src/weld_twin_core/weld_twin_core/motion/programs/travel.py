@@ -338,11 +338,7 @@ def _late(t: Array, rising: float) -> Array:
 
 
 def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
-    """
-    Return the motion of a piece with the same samples between points that moved a little.
-
-    Raises ReachError: a pose is out of reach now.
-    """
+    """Return the motion of a piece between points that moved a little; ReachError where it cannot."""
     q = np.array(piece.motion.q)
     for k, move in enumerate(piece.moves):
         first = 0 if k == 0 else int(piece.ends[k - 1])

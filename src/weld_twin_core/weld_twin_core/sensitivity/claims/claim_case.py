@@ -35,11 +35,7 @@ class Case:
 
     @cached_property
     def tolerances(self) -> tuple[Tolerance, ...]:
-        """
-        Return the stated tolerances: those of the paper's error sources.
-
-        Its initialization offset is a displacement; a turn of the base is measured apart.
-        """
+        """Return the paper's error sources; a turn of the base is measured apart."""
         every = default_tolerances(self.robot)
         return tuple(t for t in every if (t.effect, t.parameter) != ('base_pose', 'rotvec'))
 

@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Messages of other types than the table of topics has, as the messages that they stand for.
-
-Trackers publish transforms, controllers their own states. Each type is turned into a joint state
-or a pose before it is taken in, so that there is one way for all from then on.
-"""
+"""Messages of other types than the table of topics has, as the messages that they stand for."""
 
 from __future__ import annotations
 

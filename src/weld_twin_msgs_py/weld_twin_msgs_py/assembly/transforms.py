@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Frames as `/tf` and `/tf_static` tell them: a tree, and the way from one frame to another.
-
-It holds what a measurement needs and no more, so that nodes and bags use the same one whether or
-not tf2 is installed.
-"""
+"""Frames as `/tf` and `/tf_static` tell them, with or without tf2: a tree, and the ways in it."""
 
 from __future__ import annotations
 

@@ -3,10 +3,6 @@
 """
 Streaming access to one bag: a message is decoded, handed over and forgotten.
 
-Only messages of the topics that are asked for are decoded: with the definitions of Jazzy, or, for a
-type that Jazzy does not bring, with the one that the bag holds. A bag that also holds somebody's
-own types reads as well.
-
 A kilobyte of zstd can stand for gigabytes. rosbags unpacks whatever it finds, so the two unpackers
 it looks up by name are replaced here by such as stop at a size that can be meant.
 """

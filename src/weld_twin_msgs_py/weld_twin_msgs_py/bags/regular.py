@@ -4,9 +4,8 @@
 The usual bag, read by the thousand.
 
 In most bags every message of a topic has the layout of the first, stamps increase, and numbers are
-finite. Such a topic is read as columns. The first message goes through the same intake as in a
-running node; whatever is not as usual in any other one is left to the reader that takes every
-message by itself, so that both give the same samples and the same refusals.
+finite. Such a topic is read as columns; whatever is not as usual in any message is left to the
+reader that takes them one by one, so that both give the same samples and the same refusals.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Writing a bag so that nothing half-written is ever found under its name.
-
-The bag grows in a hidden directory beside its final place and is renamed when it is complete.
-"""
+"""Writing a bag so that nothing half-written is ever found under its name."""
 
 from __future__ import annotations
 

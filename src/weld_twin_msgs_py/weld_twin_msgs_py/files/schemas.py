@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-JSON Schemas of the files that people write: robot, effects, seam, artefact.
-
-Effects and seams are described from the classes that read them, so that a new one is in the
-schema by itself. An editor that takes schemas completes keys and underlines mistakes.
-"""
+"""JSON Schemas of the files that people write, described from the classes that read them."""
 
 from __future__ import annotations
 

@@ -1,17 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Serialised messages to objects that `from_messages` reads.
+Serialised messages (plain CDR, DDSI-RTPS 2.5, section 10) to objects that `from_messages` reads.
 
-A node reads its inputs here instead of in the middleware's typed take, for two reasons: bytes
-that are no message become a sentence with every length checked against what is there, and a
-joint state costs a tenth of the time. The objects are immutable, with the names and fields of the
-standard types.
-
-References
-----------
-.. [1] OMG, "DDS Interoperability Wire Protocol (DDSI-RTPS)", 2.5, section 10 (plain CDR).
-
+Against the middleware's typed take, bytes that are no message become a sentence, and a joint state
+costs a tenth of the time. The objects have the names and fields of the standard types.
 """
 
 from __future__ import annotations

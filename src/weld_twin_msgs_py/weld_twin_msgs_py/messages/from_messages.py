@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Messages to arrays.
-
-The functions read attributes only, so messages of rclpy and of rosbags serve alike. Positions in
-m, angles in rad, quaternions x y z w, stamps int64 ns.
-"""
+"""Messages of rclpy or rosbags to arrays: m, rad, quaternions x y z w, stamps int64 ns."""
 
 from __future__ import annotations
 

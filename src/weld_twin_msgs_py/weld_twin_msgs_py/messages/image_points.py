@@ -4,13 +4,8 @@
 Points found in an image: a PointCloud2 with the fields target, point, u and v, or tags.
 
 A corner of a tag is labelled by its tag and its place on the tag, as `tag_points` of the tables has
-them: clockwise from the upper left, which is OpenCV's order. The detector of AprilTags [1]_ counts
-them against the clock from the lower left.
-
-References
-----------
-.. [1] E. Olson, "AprilTag: A robust and flexible visual fiducial system", ICRA 2011.
-
+them: clockwise from the upper left, as OpenCV does. The detector of AprilTags (Olson, ICRA 2011)
+counts them against the clock from the lower left.
 """
 
 from __future__ import annotations

@@ -4,13 +4,7 @@
 Many serialised messages of one layout to columns of numbers and back, none decoded by itself.
 
 A robot that moves sends the same message again and again: frame, names and counts stay, stamp and
-numbers change. Where the first message has been decoded, the others are numbers at known places,
-as long as all that should stay is the same.
-
-References
-----------
-.. [1] OMG, "DDS Interoperability Wire Protocol (DDSI-RTPS)", 2.5, section 10 (plain CDR).
-
+numbers change, at places of plain CDR (DDSI-RTPS 2.5, section 10) that the first message tells.
 """
 
 from __future__ import annotations

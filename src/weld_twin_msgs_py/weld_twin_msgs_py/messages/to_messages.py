@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Arrays to messages.
-
-One factory serves rclpy and rosbags: both take the fields as keywords, they only differ in where
-the class comes from and in what holds a sequence of numbers.
-"""
+"""Arrays to messages of rclpy and rosbags, which both take the fields as keywords."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The writers of new programs, one for every language, and the sheets that go with them.
-
-A sheet says how to load the program, run it first, and record.
-"""
+"""The writers of new programs, one for every language, and the sheets that go with them."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A robot from whatever the user names: a bundled model, a file, or a robot of one's own by its name.
-
-A file dropped in a folder is a robot by its name, as a bundled one is.
-"""
+"""A robot from what the user names: a bundled model, a file, or one of one's own by its name."""
 
 from __future__ import annotations
 

@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The part of a URDF that matters here: joints, their frames, and link masses.
-
-Shapes, materials, transmissions and simulator tags are removed before parsing, so that nothing in
-them can stop a robot from being read.
-"""
+"""The part of a URDF that matters here and is parsed: joints, their frames, and link masses."""
 
 from __future__ import annotations
 

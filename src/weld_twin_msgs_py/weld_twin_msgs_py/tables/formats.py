@@ -3,10 +3,9 @@
 """
 Logs of controllers and exports of instruments whose form is documented: each is a file in `forms/`.
 
-A `Form` says how to recognise such a file, and what reads it. Where a line names the columns, a `Format`
-is all that is needed: which line that is, how many lines above belong to it, and which of the joined
-names mean what. What it does not name is left out: a controller's own idea of the pose is no
-measurement. docs/tables.md lists where each form is documented.
+A `Form` says how to recognise such a file, and what reads it. Where a line names the columns, a
+`Format` is all that is needed. What it does not name is left out: a controller's own idea of the
+pose is no measurement.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The lines of a delimited text as header and rows, and numbers as people and spreadsheets write them.
-
-Comments, titles, a header of two lines, units; decimal signs, groups of thousands, units behind.
-"""
+"""Delimited text as header and rows, and numbers as people and spreadsheets write them."""
 
 from __future__ import annotations
 

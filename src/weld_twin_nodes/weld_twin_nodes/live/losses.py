@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What an input of a running node lacks: by the counts of those who tell them, else by its stamps.
-
-The middleware keeps the last messages for a reader that is late and drops the others without a
-word. Nodes of the project tell with their health how many they sent; what came is compared with it.
-"""
+"""What an input of a running node lacks: by the counts of those who tell them, else by its stamps."""
 
 from __future__ import annotations
 

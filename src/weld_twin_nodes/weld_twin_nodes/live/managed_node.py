@@ -1,16 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A node that works from its start to its end, or between the transitions of a managed node.
+A node that works all the time, or between transitions (design.ros2.org/articles/node_lifecycle.html).
 
-The services are the standard ones. They are offered here, not by rclpy's mixin: that one answers
-when a transition is over, serves nothing else until then, and ends a node that is asked for a
-transition which its state does not have.
-
-References
-----------
-.. [1] https://design.ros2.org/articles/node_lifecycle.html
-
+The standard services are offered here, not by rclpy's mixin: that one serves nothing else until a
+transition is over, and ends a node that is asked for one which its state does not have.
 """
 
 from __future__ import annotations

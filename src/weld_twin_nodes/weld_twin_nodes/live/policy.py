@@ -3,8 +3,7 @@
 """
 What each node says, hears, answers and asks: the one table of it, and the SROS2 policy made of it.
 
-The reference is made from it, too; a test holds it to what the running nodes open. Names without a
-slash lie in the node's namespace.
+A test holds it to what the running nodes open. Names without a slash lie in the node's namespace.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The parameters by which a node knows its robot, its frames, and what its inputs call things.
-
-Where the base is may be taken from `/tf` when a node starts; it is watched from then on.
-"""
+"""The parameters by which a node knows its robot, its frames, and what its inputs call things."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A subscription that follows its publishers: in the type they have, and in what they offer.
-
-Who is at the other end of a topic, and why nothing may come from there or arrive there, is reported.
-"""
+"""A subscription that follows its publishers: in the type they have, and in what they offer."""
 
 from __future__ import annotations
 

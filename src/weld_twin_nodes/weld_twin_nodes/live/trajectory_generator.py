@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Trajectory generator: plans a seam and publishes it as joint states.
-
-It begins when the nodes beside it are there and reach each other, and sends in real time or as fast
-as the listeners keep up.
-"""
+"""Plans a seam and publishes it as joint states, in real time or as fast as the listeners keep up."""
 
 from __future__ import annotations
 

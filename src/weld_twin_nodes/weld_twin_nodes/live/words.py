@@ -3,8 +3,7 @@
 """
 What a node of the project tells of itself once a second, in the values of its health.
 
-The graph a node sees is its own, and the middleware drops messages without a word: that two others
-have found each other, and how many messages there were, only those know who sent or heard them.
+Whom it reaches and what it sent only a node itself knows: others have graphs of their own.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A robot program corrected by a model file: what is read, what is changed, what is reported.
-
-Whether it keeps a tolerance all along, and the model as a running node corrects goals with it.
-"""
+"""A robot program corrected by a model file: what is read, what is changed, what is reported."""
 
 from __future__ import annotations
 

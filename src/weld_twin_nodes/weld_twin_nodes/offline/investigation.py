@@ -3,10 +3,6 @@
 """
 An investigation: diagnose, ask for the measurement that would decide, take it in, go on.
 
-Everything that it knows is in one file, so that days may pass between a question and its answer. Every
-question says what it will decide and how long it takes before it is put, and is judged by that
-when the recording has come in.
-
 What poor recordings show is easily misread, and then stands in the way of what better ones show. So
 all recordings are diagnosed together, and the experiments without the first ones. Each knows how often
 answers like it were right; the other speaks for it or against it.

@@ -3,15 +3,10 @@
 """
 Output folders: new files appear when all of them are made, and nothing of a person's is lost.
 
-A folder that was not there appears whole, in one step. In a folder that is there, ours are replaced one
-by one, each whole, and the rest stays. A list in the folder (`LIST`) holds the names and digests of
-what was written there. A file is ours as long as its digest is the one in the list: once a person has
-changed it, it is theirs. Nothing that is not ours is ever deleted or overwritten; at the most it gets
-another name.
-
-New files are made in a scratch directory, together with a note of what is to happen with them. From
-the moment the note is whole, the change is decided: who is killed while files are moved into place has
-the rest of them moved by the next one who works in the folder.
+A file is ours as long as its digest is the one in the list of the folder (`LIST`). New files are made
+in a scratch directory, together with a note of what is to happen with them. From the moment the note is
+whole, the change is decided: who is killed while files are moved into place has the rest of them moved
+by the next one who works in the folder. docs/folders.md says more.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The twin with identified effects over a whole recording, and how sure it is.
-
-Also the commands that put the real tool on the seam, and tables and a picture of poses and deviations.
-"""
+"""The twin with identified effects over a whole recording, and commands corrected by it."""
 
 from __future__ import annotations
 

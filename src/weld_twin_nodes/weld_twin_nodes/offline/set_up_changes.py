@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What a person changed in the cell for one recording, for the diagnosis of several.
-
-A load hangs at a known place and pulls with a known force. How a tool was lengthened, or where an
-instrument stands now, is known roughly; what is left of it is fitted along.
-"""
+"""What a person changed in the cell for one recording, for the diagnosis of several."""
 
 from __future__ import annotations
 

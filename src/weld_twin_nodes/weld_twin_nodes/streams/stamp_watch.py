@@ -3,9 +3,6 @@
 """
 What the stamps of streams tell: messages that are missing, a clock that jumped, a new run, two clocks.
 
-A middleware that drops a message says nothing of it. A publisher of somebody else tells no counts
-either, but what has a beat has stamps on that beat, and a gap between two of them is reported here.
-
 Of two clocks, offsets of a second and more show in the stamps that arrive together. Smaller ones hide
 behind the time a message takes on its way; they show in the motion: the measured way is that of the
 twin, shifted in time.

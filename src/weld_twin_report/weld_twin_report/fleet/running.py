@@ -3,8 +3,7 @@
 """
 A list of recordings, a line each, diagnosed into a database: resumable, each written once.
 
-Workers diagnose and know nothing of the database. This process writes each result, verdict and
-record of the run, in one transaction, and what is written is not asked for again. So a kill at any
+This process writes each result, verdict and record of the run, in one transaction: a kill at any
 instant costs what was running then, and nothing else. What a database cannot take now is kept, and
 written as soon as it can.
 """

@@ -4,8 +4,7 @@
 The history in a database: one schema on SQLite and PostgreSQL, through SQLAlchemy.
 
 Arrays are kept as bytes of little-endian doubles, packed: a history of 10,000 diagnoses is some
-100 MB. An entry is written in one transaction, whole or not at all, and once: the same recording of
-the same cell is not added twice.
+100 MB. An entry is written in one transaction, and once.
 """
 
 from __future__ import annotations

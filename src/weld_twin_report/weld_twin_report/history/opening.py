@@ -1,10 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A database opened as a history: recognised, made where it is empty, brought to this version.
-
-Reading makes nothing anywhere. What belongs to another application is refused, whatever was asked.
-"""
+"""A database opened as a history: recognised, made where it is empty, brought to this version."""
 
 from __future__ import annotations
 

@@ -4,10 +4,8 @@
 The tables of the history, alike on SQLite and PostgreSQL, and what brings an older version to them.
 
 A change of the schema is a function here that makes version k + 2 of version k + 1, in its place in
-`STEPS`, all of them in one transaction. The tables are the newest; a step adds what they have besides,
-with plain SQL that SQLite and PostgreSQL both take. A kit for migrations is left out on purpose: users
-open a history by their first command, there is nobody who runs an upgrade, and a table with one number
-says all that five tables in one line of versions need.
+`STEPS`, with plain SQL that both take. A kit for migrations is left out on purpose: users open a history
+by their first command, and there is nobody who runs an upgrade.
 """
 
 from __future__ import annotations

@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What is said of a diagnosis: page, terminal and print draw it.
-
-What more than one of them says, or more than one place of the page, is said here, of a single cause
-in `cause_answer`. What one section alone says stands with that section.
-"""
+"""What more than one place of page, terminal and print says of a diagnosis."""
 
 from __future__ import annotations
 

@@ -7,12 +7,9 @@ A page of another site must not reach this server through the browser of who sit
 that the browser asked for must be one of ours, and whatever changes something must come from a page
 of ours.
 
-Connections that say nothing, or say it slowly, keep nobody out. A connection has a few seconds for the
-head of its request. Of one address only so many may wait for theirs, and of all only so many may be
-open; beyond, the one that has waited longest gives way, which is never that of somebody who asks at
-once. uvicorn has a limit for idle connections after an answer and none before the first request.
-Hypercorn closes slow heads, granian all but silent ones; no server counts by address, so that this
-would be needed beside them as well.
+Of one address only so many connections may wait for the head of their request, for a few seconds;
+beyond, the one that has waited longest gives way. uvicorn has no limit before the first request, and
+no server counts by address.
 """
 
 from __future__ import annotations

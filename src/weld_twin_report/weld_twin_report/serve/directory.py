@@ -3,9 +3,8 @@
 """
 The directory of a server: marked as such, held by one server at a time.
 
-A server works only in a directory that is new, empty, or marked by an earlier one, and removes only
-what it made there itself. The mark is a file that is locked while a server runs; the system lets go of
-the lock when its process ends, however it ends.
+A server works only in a directory that is new, empty, or marked by an earlier one. The mark is a file
+that is locked while a server runs; the system lets go of it when its process ends, however it ends.
 """
 
 from __future__ import annotations

@@ -1,11 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The fields of the forms: each is an option of a command, under a title that somebody understands.
-
-One table says what a field is called, what it may hold, and which commands take it. The commands do
-the work; what they say of an option is the field's title.
-"""
+"""The fields of the forms: each is an option of a command, under a title that somebody understands."""
 
 from __future__ import annotations
 

@@ -3,9 +3,8 @@
 """
 Files that somebody dropped, written into a folder: few, small enough, under plain names.
 
-Bodies of requests bring no more than is allowed, and not slower than a poor line. Only the time is
-counted in which the server waits for bytes, not the time that its own disk takes. Where many send at
-once, whoever lags most behind the slowest pace allowed gives way to who comes.
+Bodies of requests come not slower than a poor line, by the time in which the server waits for bytes.
+Where many send at once, whoever lags most gives way to who comes.
 """
 
 from __future__ import annotations

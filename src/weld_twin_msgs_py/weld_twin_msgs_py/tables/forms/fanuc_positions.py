@@ -3,8 +3,7 @@
 """
 Current positions of a FANUC controller, ``MD:CURPOS.DG``, one after the other in a file.
 
-The controller makes the file whenever it is fetched, by FTP or by its web page. Its joints have
-hundredths of a degree; where it takes its own tool to be is no measurement, and is left out.
+The controller makes it by FTP or web page. Where it takes its own tool to be is no measurement.
 """
 
 from __future__ import annotations

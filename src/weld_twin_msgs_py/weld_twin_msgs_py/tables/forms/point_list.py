@@ -3,8 +3,7 @@
 """
 Lists of points: names, then x, y, z, as SpatialAnalyzer and others write them, and no header.
 
-A comparison has two points to a name, nominal and measured, and often what they differ by, which tells
-the one from the other.
+A comparison has two points to a name, and often what they differ by, which tells them apart.
 """
 
 from __future__ import annotations

@@ -3,13 +3,9 @@
 """
 The commands as a table, a row each; `..main` names them in the order of the help.
 
-What a command does is the function `run` of the module of its name, or one of the name of its job::
-
-    def run(given: Given) -> int: ...
-
-It returns the exit code and raises `weld_twin_core.errors.TwinError` for anything the user can mend. A
-module is loaded when its command runs, not for its help; what only some runs need and is slow to import
-is imported there. Options that few need are rare: `--help` fits on one screen without them.
+What a command does is the function `run` of the module of its name, or one of the name of its job. It
+returns the exit code and raises a TwinError for anything the user can mend. A module is loaded when its
+command runs, not for its help. Options that few need are rare: `--help` fits on one screen without them.
 """
 
 from __future__ import annotations

@@ -88,6 +88,12 @@
     drawRuler(pen, project.scale, width, height);
   }
 
+  function lined(pen, ...points) {
+    pen.beginPath();
+    points.forEach((p, i) => (i ? pen.lineTo(...p) : pen.moveTo(...p)));
+    pen.stroke();
+  }
+
   function drawRun(pen, point, run, gap) {
     const count = run.path.length / 3, stretch = view.stretch;
     const nominal = [], measured = [], size = [];
@@ -105,16 +111,11 @@
       drawDots(pen, nominal, measured, size);
       return;
     }
-    pen.beginPath();
-    nominal.forEach(([u, v], i) => (i ? pen.lineTo(u, v) : pen.moveTo(u, v)));
-    pen.stroke();
+    lined(pen, ...nominal);
     pen.lineWidth = 2.4;
     for (let i = 1; i < count; i++) {
       pen.strokeStyle = colour((size[i - 1] + size[i]) / 2);
-      pen.beginPath();
-      pen.moveTo(...measured[i - 1]);
-      pen.lineTo(...measured[i]);
-      pen.stroke();
+      lined(pen, measured[i - 1], measured[i]);
     }
   }
 
@@ -172,10 +173,7 @@
     const [u, v] = point(...nominal.map((value, k) => value + view.stretch * off[k]));
     pen.strokeStyle = style('--ink');
     pen.lineWidth = 2;
-    pen.beginPath();
-    pen.moveTo(...point(...nominal));
-    pen.lineTo(u, v);
-    pen.stroke();
+    lined(pen, point(...nominal), [u, v]);
     pen.beginPath();
     pen.arc(u, v, 7, 0, 7);
     pen.stroke();
@@ -201,10 +199,7 @@
     nominal.forEach((from, i) => {
       pen.strokeStyle = pen.fillStyle = colour(size[i]);
       pen.lineWidth = 1.2;
-      pen.beginPath();
-      pen.moveTo(...from);
-      pen.lineTo(...measured[i]);
-      pen.stroke();
+      lined(pen, from, measured[i]);
       pen.beginPath();
       pen.arc(...measured[i], 1.8, 0, 7);
       pen.fill();
@@ -235,10 +230,7 @@
     [['x', 1, 0, 0], ['y', 0, 1, 0], ['z', 0, 0, 1]].forEach(([name, ...axis]) => {
       const [u, v] = direction(...axis);
       if (Math.hypot(u, v) < 0.15) return;
-      pen.beginPath();
-      pen.moveTo(...foot);
-      pen.lineTo(foot[0] + 18 * u, foot[1] + 18 * v);
-      pen.stroke();
+      lined(pen, foot, [foot[0] + 18 * u, foot[1] + 18 * v]);
       pen.fillText(name, foot[0] + 25 * u, foot[1] + 25 * v);
     });
   }
@@ -250,12 +242,7 @@
     const end = width - 14, start = end - length * scale, y = height - 14;
     pen.strokeStyle = pen.fillStyle = style('--soft');
     pen.lineWidth = 1.2;
-    pen.beginPath();
-    pen.moveTo(start, y - 4);
-    pen.lineTo(start, y);
-    pen.lineTo(end, y);
-    pen.lineTo(end, y - 4);
-    pen.stroke();
+    lined(pen, [start, y - 4], [start, y], [end, y], [end, y - 4]);
     pen.textAlign = 'right';
     pen.textBaseline = 'bottom';
     pen.fillText(length >= 1e4 ? `${length / 1e3} mm` : `${length} µm`, end, y - 5);

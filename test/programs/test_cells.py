@@ -266,6 +266,7 @@ def test_a_corrected_program_takes_the_real_tool_to_the_place_on_the_real_workpi
         'is -tilt' in note and 'compare them with the pendant' in note for note in entry['notes']
     )
     # Nothing but digits of points differs.
+    after = re.sub(r'[^\n]*corrected by weld_twin[^\n]*\n', '', after)
     assert re.sub(r'[-\d.]', '', after) == re.sub(r'[-\d.]', '', text)
 
 

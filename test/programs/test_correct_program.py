@@ -84,9 +84,14 @@ REMARKS = {
 """How a corrected file says so, with what stands behind it: where controllers take remarks."""
 
 
-def without_remark(text):
-    """Return a corrected file without the line that says so."""
-    return readers.re.sub(r'[^\n]*corrected by weld_twin[^\n]*\n', '', text)
+def unmarked(folder, language):
+    """Return the texts of a corrected program without the remark, which stands where it belongs."""
+    files, out = CELLS[language][1], []
+    remarks = REMARKS.get(language, ['# {}\n'])
+    for text, remark in zip(texts(folder, files), remarks, strict=True):
+        assert remark.format('corrected by weld_twin') in text
+        out.append(readers.re.sub(r'[^\n]*corrected by weld_twin[^\n]*\n', '', text))
+    return out
 
 
 @pytest.mark.parametrize('language', CELLS)
@@ -145,16 +150,13 @@ def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(langu
     assert errors[1][led].max() < ROUNDING.get(language, 4e-6)
     expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
     assert expected['after']['rms_m'] < 0.05 * expected['before']['rms_m']
-    written = [without_remark(text) for text in texts(tmp_path / 'out', files)]
+    written = unmarked(tmp_path / 'out', language)
     for pair in zip(texts(MADE, files), written, strict=True):
         old, new = (''.join(readers.re.split(readers.NUMBER, text)) for text in pair)
         assert old == new
         old, new = (readers.re.findall(r'(?:;|!|#)[^\n]*', text) for text in pair)
         assert old == new
-    remarks = REMARKS.get(language, ['# {}\n'])
-    for text, remark in zip(texts(tmp_path / 'out', files), remarks, strict=True):
-        assert remark.format('corrected by weld_twin') in text
-    # On another machine, with nothing near that tells where it comes from, it is refused by it.
+    # On another machine, with nothing near that tells where it comes from, it is refused.
     (tmp_path / 'elsewhere').mkdir()
     for file in files:
         (tmp_path / 'out' / file).rename(tmp_path / 'elsewhere' / file)

@@ -232,6 +232,8 @@ IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
         ('fanuc-ls', '   5:  UTOOL[R[2]]=PR[3] ;\n', 'UTOOL 1 are set'),
         ('fanuc-ls', '   5:  Touch Offset PR[1] ;\n', 'Touch Offset'),
         ('inform', 'SETTOOL TL#(1) P001\n', 'TL 1 are set'),
+        ('krl', '$WORLD.Z = 100\n', 'what bases count from'),
+        ('krl', f'$ROBROOT={FRAME}\n', 'what bases count from'),
     ],
 )
 def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, reason):
@@ -244,6 +246,14 @@ def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, 
     own = context(robot, language).controller
     moves = [move for piece in to_moves(program, wt.load(robot), own).pieces for move in piece]
     assert any(move.kind == 'unknown' and reason in move.why for move in moves)
+
+
+def test_a_program_that_goes_along_with_a_conveyor_is_left():
+    text = (MADE / 'bracket.ls').read_text()
+    for schedule, along in ((0, False), (2, True)):
+        head = f'/APPL\nLINE_TRACK;\n  LINE_TRACK_SCHEDULE_NUMBER : {schedule};\n'
+        steps = read('fanuc-ls', (text.replace('/APPL\n', head),), 'fanuc_m10ia').steps
+        assert {'conveyor' in step.shift.why for step in steps} == {along}
 
 
 KRL_TOOL = '$TOOL = {{X 0,Y 0,Z {},A 0,B 0,C 0}}\n'
@@ -399,6 +409,8 @@ def test_what_a_routine_sets_holds_after_its_call(language, text, reason):
 ABB_MOVE, ABB_ON, ABB_OFF = 'MoveL p1,v100,fine,tool0;', 'PDispSet x;', 'PDispOff;'
 TP_MOVE, TP_ON, TP_OFF = 'L P[1] 9mm/sec FINE', 'Touch Offset PR[1]', 'Touch Offset End'
 JOB_MOVE, JOB_ON, JOB_OFF = 'MOVL C00001 V=9.0', 'SFTON P001', 'SFTOF'
+UR_MOVE, UR_HOME = 'movel(p[0.3,0.2,0.1,0,3.1,0])', 'movej([0,-1.4,1.6,-1.8,-1.5,0])'
+UR_ON, UR_OFF = 'track_conveyor_linear(p[1,0,0,0,0,0], 9)', 'stop_conveyor_tracking()'
 JOB_HEAD = (
     '/JOB\n//NAME A\n//POS\n///TOOL 1\n///POSTYPE ROBOT\nC00001=900,0,300,180,0,0\n//INST\nNOP\n'
 )
@@ -435,6 +447,19 @@ TP_TAIL = (
         ('inform', [JOB_ON, 'JUMP *A IF IN#(1)=ON', JOB_OFF, '*A', JOB_MOVE], [False]),
         ('inform', [JOB_ON, JOB_OFF, JOB_MOVE], [True]),
         ('inform', ['*A', JOB_MOVE], [True]),
+        (
+            'rapid',
+            ['CONNECT i WITH t;', ABB_MOVE, 'ENDPROC', 'TRAP t', ABB_ON, 'ENDTRAP', 'PROC b()'],
+            [False],
+        ),
+        ('urscript', [UR_ON, UR_HOME, UR_MOVE], [True, False, False]),
+        ('urscript', [UR_ON, UR_OFF, UR_MOVE], [True, True, True]),
+        ('urscript', ['path_offset_set(x, 2)', UR_HOME, UR_MOVE], [True, False, False]),
+        ('urscript', ['if a:', UR_ON, 'end', UR_MOVE], [True, False]),
+        ('urscript', ['def b():', UR_ON, 'end', 'b()', UR_MOVE], [True, False]),
+        ('urscript', ['def b():', UR_MOVE, 'end', UR_ON, 'b()'], [False, True]),
+        ('urscript', ['def b():', UR_MOVE, 'end', 'b()'], [True]),
+        ('fanuc-ls', ['MP Offset PR[1] RPM[1]', TP_MOVE], [False]),
     ],
 )
 def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines, known):
@@ -442,6 +467,7 @@ def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines
         'rapid': (RAPID_SEAM.partition('sub;')[0], '{}\n', 'ENDPROC\nENDMODULE\n'),
         'fanuc-ls': ('/PROG A\n/MN\n', '   1:{} ;\n', TP_TAIL),
         'inform': (JOB_HEAD, '{}\n', 'END\n'),
+        'urscript': ('def a():\n', '{}\n', 'end\n'),
     }[language]
     text = head + ''.join(form.format(line) for line in lines) + tail
     steps = read(language, (text,), PROGRAMS[language][0]).steps
@@ -485,7 +511,7 @@ def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
         ('rapid', 'MovePnP pElsewhere, v100, fine, tElsewhere;\n'),
         ('rapid', 'SearchL di1, pHere, p10, v10, tTorch;\n'),
         ('rapid', 'EGMRunJoint egm1, EGM_STOP_HOLD;\n'),
-        ('urscript', 'path_offset_set(p[0,0,0.1,0,0,0], 1)\n'),
+        ('urscript', 'servoc(p[0,0,0.1,0,0,0])\n'),
         ('inform', 'SMOVL C00001 V=100.0\n'),
         ('inform', 'SYMOVL C00001 V=100.0 CV#(1)\n'),
         ('inform', 'MOVL C00001 V=100.0\n  +MOVJ C00002 VJ=10.0\n'),

@@ -42,7 +42,9 @@ _SHIFTING = re.compile(
     r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_|\bRTCP\b|\bTA_REF\b', re.I
 )
 """What lets a move go elsewhere; RTCP is a tool that stands still."""
-_DISPLACING = re.compile(r'Touch Offset (End\b)?', re.I)
+_DISPLACING = re.compile(r'(?:Touch|MP) Offset (End\b)?', re.I)
+_TRACKING = re.compile(r'^[ \t]*LINE_TRACK_SCHEDULE_NUMBER[ \t]*:[ \t]*[1-9]', re.M)
+"""Head of a program whose points move with a conveyor; the schedule 0 is none."""
 _BLOCK = re.compile(r'(?:(IF(?=\b.*\bTHEN\Z)|FOR)\b|(ELSE)\Z|(END(?:IF|FOR))\Z|(LBL)\[)', re.S)
 """Where the program branches or goes round, another branch, where they come together; a label."""
 _FRAME_SET = re.compile(r':[ \t]*(UFRAME|UTOOL)\[\s*(\d*)(?!\d)[^=\r\n]*=')
@@ -73,6 +75,7 @@ class FanucReader(Reader):
         for result in _STATEMENT.finditer(self.text, moves, points):
             self._statement(result)
         self._refuse_open(moves, points)
+        self.shift_all(_TRACKING, 'it goes along with the conveyor of {}')
         return self.program
 
     def _refuse_open(self, start: int, end: int) -> None:
@@ -165,7 +168,7 @@ class FanucReader(Reader):
             self.program.dwell(max(float(wait[1]), 0.0))
         offset = _DISPLACING.match(text)
         if offset is not None:
-            self.shift = Frame('', why='' if offset[1] else f'Touch Offset at {where} shifts it')
+            self.shift = Frame('', why='' if offset[1] else f'{offset[0]}at {where} shifts it')
         block = _BLOCK.match(text)
         if block is not None and block[4] and _DISPLACING.search(self.text):
             self.shift = unclear_shift(where)

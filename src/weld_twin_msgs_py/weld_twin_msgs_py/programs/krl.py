@@ -87,6 +87,8 @@ _SETS = {
     for what in ('TOOL', 'BASE')
 }
 """What sets tool or base."""
+_ROOT_SET = re.compile(r'^[ \t]*\$(?:WORLD|ROBROOT|ERSYSROOT)\b[^=\r\n]*=', re.I | re.M)
+"""What bases count from, and where the arm stands in it."""
 _WITH = re.compile(r'\bWITH\b', re.I)
 _ALONG = re.compile(
     r'EK[ \t]*\([ \t]*MACHINE_DEF\[[ \t]*(\w+)[ \t]*\]\.ROOT[ \t]*,'
@@ -174,6 +176,7 @@ class KrlReader(Reader):
         )
         self.settle('tool', OTHER_TOOL, self.tools)
         self.settle('base', OTHER_BASE, self.bases)
+        self.shift_all(_ROOT_SET, 'what bases count from is set at {}')
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
         return self.program
 

@@ -169,7 +169,7 @@ def marked(source: Source, name: str) -> Source:
     place = found.start() if found and found[0] else len(text.rstrip('\x1a'))
     head, rest = text[:place], text[place:]
     end = '\r\n' if '\r\n' in text else '\n'
-    number = int((re.findall(r'^[ \t]*(\d+):', head, re.M) or ['0'])[-1]) + 1
+    number = max(map(int, re.findall(r'^[ \t]*(\d+):', head, re.M)), default=0) + 1
     if name == 'fanuc-ls':
         head = _COUNT.sub(rf'\g<1>{number}', head)
     gap = '' if head.endswith('\n') else end

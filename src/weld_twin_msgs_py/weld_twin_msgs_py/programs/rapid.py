@@ -84,7 +84,11 @@ _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(
     r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC[ \t]+\w+|TRAP)[ \t]+(\w+)', re.I | re.M
 )
-_CALLED = r'(?:^|(?<=;))[ \t]*(?:IF\b[^;\r\n]*?[ \t)])?({})(?=[ \t]*[;\\]|[ \t]+[\w"\[])(?!\s*:=)'
+_CALLED = (
+    r'(?:^|(?<=;))[ \t]*(?:IF\b[^;\r\n]*?[ \t)]|CONNECT[ \t]+\w+[ \t]+WITH[ \t]+)?({})'
+    r'(?=[ \t]*[;\\]|[ \t]+[\w"\[])(?!\s*:=)'
+)
+"""A call of a routine, or what is set up to call it at any time."""
 _BLOCK = re.compile(
     r'^[ \t]*(?:(IF(?=\b[^;]{0,500}?\bTHEN\b)|TEST|FOR|WHILE)|(ELSEIF|ELSE|CASE|DEFAULT)|'
     r'(END(?:IF|TEST|FOR|WHILE)))\b',

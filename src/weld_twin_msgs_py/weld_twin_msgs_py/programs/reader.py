@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from weld_twin_core.errors import DataError
@@ -172,6 +173,14 @@ class Reader(ABC):
         only = own[0] if own else Frame('')
         for piece in self.program.pieces:
             exchange(piece, name, inherited, only)
+
+    def shift_all(self, pattern: re.Pattern[str], why: str) -> None:
+        """Let no move go where its point says, for a reason with {} for where a pattern stands."""
+        match = pattern.search(self.text)
+        if match is not None:
+            shift = Frame('', why=why.format(self.where(match)))
+            for piece in self.program.pieces:
+                piece[:] = [replace(step, shift=shift) for step in piece]
 
     def unknown(self, kind: Kind, match: re.Match[str], why: str) -> None:
         """Add a move that is not understood."""

@@ -10,6 +10,7 @@ References
 ----------
 .. [1] "URScript Quick Reference" of the daemon urd, and the wrapper of the URScript manual 1.8:
    arguments of movej, movel and movec, poses in m with rotation vectors.
+.. [2] Universal Robots, "Script manual, e-Series": track_conveyor_linear, path_offset_enable.
 
 """
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .blocks import Blocks, unclear
+from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .context import Context
 from .controllers import Frame
@@ -42,9 +44,14 @@ DEFAULT_SPEED = {'joint': 1.05, 'linear': 0.25, 'circular': 0.25}
 OTHER_MOTION = (
     'servoj|servol|servoc|speedj|speedl|force_mode|conveyor_pulse_decode|freedrive_mode|'
     r'teach_mode|optimovej|optimovel|path_offset_\w+|set_reference_frame|move_process|'
-    r'track_conveyor_\w+|frame_tracking_\w+|screw_driving'
+    r'track_conveyor_\w+|stop_conveyor_tracking|frame_tracking_\w+|screw_driving|end_\w+_mode'
 )
 """Functions that move the arm, or its frames, in another way."""
+_DISPLACES = re.compile(
+    r'track_conveyor_|path_offset_(?:enable|set)|(?:force|freedrive|teach)_mode'
+)
+_ENDS = re.compile(r'stop_conveyor_tracking|path_offset_disable|end_\w+_mode')
+"""What lets all moves after it go elsewhere than their points say, and what ends that [2]_."""
 OTHER_TOOL = Frame(
     'set_tcp', why='the numbers of set_tcp are given in other routines, and not the same'
 )
@@ -72,30 +79,23 @@ class UrscriptReader(Reader):
         self.used: set[int] = set()
         self.tool = Frame('')
         self.tools: list[Frame] = []
+        self.blocks = Blocks(self.program, tool=unclear('set_tcp'), shift=unclear_shift)
+        self.around: list[Frames | None] = []
+        """Blocks that are open; of a routine what holds around it."""
+        self.displaced = _displaces(self.text)
 
     def read(self) -> Program:
-        calls = self.calls(self._routines(), lambda text: 'set_tcp' in text, _CALL)
+        routines = self._routines()
+        tools = self.calls(routines, lambda text: 'set_tcp' in text, _CALL)
+        shifts = self.calls(routines, _displaces, _CALL)
         self._declare()
-        routines: list[Frame | None] = []  # blocks that are open; of a routine the tool around it
-        blocks = Blocks(self.program, tool=unclear('set_tcp'))
-        found = [*_WORD.finditer(self.text), *calls]
-        for result in sorted(found, key=lambda each: each.start()):
-            if result.re is not _WORD:
-                self.tool = OTHER_TOOL
-            elif result[5]:
-                self._statement(result)
-            elif result[6]:
-                routines.append(self.tool)
-                self.new_piece(result)
-                self.tool = OTHER_TOOL if self.routines > 1 else self.tool
-            elif result[9] and routines and (around := routines.pop()) is not None:
-                # To define a routine moves nothing: what stands around it goes on as before.
-                self.program.new_piece()
-                self.tool = around
-            else:
-                routines += [None] if result[7] else []
-                words = result.groups()[6:9]
-                (self.tool,) = blocks.follow(self.where(result), words, (self.tool,))
+        self.in_order(
+            {_WORD: self._word},
+            more=[
+                (lambda _: setattr(self, 'tool', OTHER_TOOL), tools),
+                (lambda call: setattr(self, 'shift', unclear_shift(self.where(call))), shifts),
+            ],
+        )
         self.settle('tool', OTHER_TOOL, self.tools)
         names = {name: point for name, point in self.names.items() if point >= 0}
         hold_if_used_elsewhere(self.program, names, [self.text], [self.used])
@@ -103,6 +103,25 @@ class UrscriptReader(Reader):
             if name in self.names:
                 self.program.hold(self.names[name], f'{name} is set anew at {where}')
         return self.program
+
+    def _word(self, result: re.Match[str]) -> None:
+        held = (self.tool, self.shift)
+        if result[5]:
+            self._statement(result)
+        elif result[6]:
+            self.around.append(held)
+            self.new_piece(result)
+            if self.routines > 1:  # who calls it, or what runs beside it, is not followed
+                self.tool = OTHER_TOOL
+                self.shift = unclear_shift(self.where(result)) if self.displaced else self.shift
+        elif result[9] and self.around and (around := self.around.pop()) is not None:
+            # To define a routine moves nothing: what stands around it goes on as before.
+            self.program.new_piece()
+            self.tool, self.shift = around
+        else:
+            self.around += [None] if result[7] else []
+            words = result.groups()[6:9]
+            self.tool, self.shift = self.blocks.follow(self.where(result), words, held)
 
     def _routines(self) -> list[tuple[str, Span]]:
         """Return names and statements of the routines; of one that holds others, all of it."""
@@ -143,6 +162,10 @@ class UrscriptReader(Reader):
             self._move(result[1], where, opening + 1, end)
         elif result[2]:
             self.program.unknown('linear', where, f'{result[2]} moves the arm in its own way')
+            if _DISPLACES.match(result[2]):
+                self.shift = Frame('', why=f'{result[2]} at {where} displaces it')
+            elif _ENDS.match(result[2]):
+                self.shift = Frame('')
         elif result[3]:
             self.tool = self._tool(opening + 1, end)
             self.tools.append(self.tool)
@@ -179,9 +202,8 @@ class UrscriptReader(Reader):
             speed = float(speed / np.max(self.context.robot.max_velocity))
         stop = self.value(given.get('r'), 0.0) <= 0.0
         base, speed = Frame('', np.eye(4)), max(speed, LEAST_SPEED)
-        self.program.add(
-            Step(kind, where, end_ref, via, self.tool, base, speed, stop, suits=suits)
-        )
+        step = Step(kind, where, end_ref, via, self.tool, base, speed, stop, suits=suits)
+        self.program.add(replace(step, shift=self.shift))
 
     def _arguments(self, order: Sequence[str], start: int, end: int) -> dict[str, tuple[int, int]]:
         """Return the piece of text of every argument by its name."""
@@ -278,3 +300,8 @@ class UrscriptReader(Reader):
         """Return a coordinate without its sign and exponent, to see whether it is worked out."""
         text = self.text[start:end].lstrip('+-')
         return re.sub(r'(?<=[\d.])[eE][-+]?\d+', '', text)
+
+
+def _displaces(text: str) -> bool:
+    """Return whether moves are displaced after a routine, or no longer are, by its text."""
+    return any(each.search(text) for each in (_DISPLACES, _ENDS))

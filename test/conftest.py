@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import TwinError
-from weld_twin_lab.campaigns.building.message_packages import messages_importable
+from weld_twin_lab.campaigns.message_packages import messages_importable
 
 HERE = Path(__file__).parent
 FOLDERS = ('diagnosis', 'house', 'serve', 'soundness')

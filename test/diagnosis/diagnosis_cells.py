@@ -16,8 +16,8 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 SIGMA = 2e-5

@@ -18,8 +18,8 @@ from diagnosis_cells import all_but
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 from weld_twin_msgs_py.robots import read_urdf, write_urdf
 from weld_twin_nodes.cli import main

@@ -8,8 +8,8 @@ from diagnosis_cells import all_but, recorded
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_lab.blind.blind_cell import as_recording
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 LITTLE = 2e-5

@@ -10,8 +10,8 @@ import pytest
 from weld_twin_core import JointMotion, Recording, Twin, load
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.effects import JointCompliance, Payload
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 

@@ -40,7 +40,7 @@ def commands(page):
 def measure(table, robot, third_from_ground):
     """Fill the table in as a tracker would that stands somewhere, on an arm that is off."""
     plant = pytest.importorskip('weld_twin_lab.plant.plant', reason='needs MuJoCo')
-    from weld_twin_lab.plant.plant_recording import Command
+    from weld_twin_lab.plant.exponentials import Command
     from weld_twin_lab.plant.tracker import Tracker
 
     with open(table, newline='') as file:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from weld_twin_lab.benchmark.made_history import fill
+from weld_twin_lab.benchmark.waiting_data import fill
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.fleet.cell_page import baseline
 from weld_twin_report.history import Database

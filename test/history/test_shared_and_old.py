@@ -20,7 +20,8 @@ import pytest
 from own_postgres import NoServer, place_of, postgres, start, stop
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.benchmark.made_history import fill, made
+from weld_twin_lab.benchmark.waiting_data import drawn as made
+from weld_twin_lab.benchmark.waiting_data import fill
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, Unavailable
 

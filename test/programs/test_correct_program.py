@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
 from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_lab.programs.plain_arm import along, joints_for, tool_pose
+from weld_twin_lab.programs.plain_controller import along, joints_for, tool_pose
 from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli.in_process import weld_twin
 

@@ -10,7 +10,7 @@ import yaml
 
 import weld_twin_core as wt
 from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_lab.programs.plain_arm import joints_for, tool_pose
+from weld_twin_lab.programs.plain_controller import joints_for, tool_pose
 from weld_twin_nodes.cli.in_process import weld_twin
 
 CELLS = {

@@ -12,7 +12,7 @@ import pytest
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm import catalog
-from weld_twin_lab.programs.plain_arm import tool_pose
+from weld_twin_lab.programs.plain_controller import tool_pose
 from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = 'kuka_kr6_r900'

@@ -1,17 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One way to run a study: its options, its tasks, what is kept of them, and how it ends.
+One way to run a study: its tasks, what is kept of them, and what it writes.
 
-A study is a subcommand: a module with a docstring, whose first line is the short help, and::
-
-    OPTIONS = options('--cases N  how many [default: 40]')
-
-    @study
-    def run(study: Study) -> bool | None: ...
-
-What is slow to import is imported inside. Tasks are kept in the folder of the study as soon as they are
-there, so that one that was stopped goes on.
+A study is a function of a `Study`, and a row of the table in `cli/lab.py`; it returns False where a goal
+was missed. Tasks are kept in the folder of the study as soon as they are there, so that one that was
+stopped goes on.
 """
 
 from __future__ import annotations
@@ -21,7 +15,6 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import wraps
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,8 +24,6 @@ from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 from weld_twin_nodes.cli.given import Given
-from weld_twin_nodes.cli.options import POOL
-from weld_twin_nodes.cli.parsing import Options
 from weld_twin_nodes.offline.output_directory import write_owned
 
 if TYPE_CHECKING:
@@ -50,39 +41,13 @@ DONE = 'done'
 """Folder of what is kept of the tasks of a study, with a folder of each engine that did them."""
 
 
-def options(
-    *rows: Options, out: str = 'where results go', of: str = 'DIR', pool: bool = False
-) -> tuple[Options, ...]:
-    """
-    Return the options of a study.
-
-    *rows: tables as `add_options` reads them.
-    out, of: what ``--out`` says; it must be given. An empty text adds none.
-    pool: whether tasks run on several cores or on a cluster.
-    """
-    return *rows, *([POOL] * pool), *([f'--out {of}, required  {out}'] * bool(out))
-
-
 def listed(text: str) -> list[str]:
     """Return what stands between commas."""
     return [part.strip() for part in text.split(',') if part.strip()]
 
 
 class Study:
-    """
-    A study that runs.
-
-    Parameters
-    ----------
-    args : Given
-        Its options.
-
-    Attributes
-    ----------
-    out : Path
-        Its folder, or its file.
-
-    """
+    """A study that runs: its options, and its folder."""
 
     def __init__(self, args: Given) -> None:
         self.args = args
@@ -172,13 +137,3 @@ def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) 
 def head(schema: str, **more: Any) -> dict[str, Any]:
     """Return what the results of a study begin with: what they are and what made them."""
     return {'schema': f'weld_twin/{schema}', 'version': __version__, **more}
-
-
-def study(run: Callable[[Study], bool | None]) -> Callable[[Given], int]:
-    """Return the subcommand of a study; one that returns False has missed a goal."""
-
-    @wraps(run)
-    def command(args: Given) -> int:
-        return MISSED if run(Study(args)) is False else 0
-
-    return command

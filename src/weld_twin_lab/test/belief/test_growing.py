@@ -4,7 +4,8 @@
 
 import pytest
 
-from weld_twin_lab.belief.growing import apart, page, steps
+from weld_twin_lab.belief.baseline import apart, steps
+from weld_twin_lab.belief.baseline import growing_page as page
 
 PLAY, LINK = ('backlash', 'elbow_joint'), ('link_length', 'elbow_joint')
 

@@ -10,10 +10,16 @@ from weld_twin_core.diagnosis.calibration.features import odds
 from weld_twin_core.diagnosis.calibration.weights import calibration_from
 from weld_twin_core.errors import DataError
 from weld_twin_lab.belief import learning
-from weld_twin_lab.belief.bound import bounded, precise, upper_limit
 from weld_twin_lab.belief.judged import Example
-from weld_twin_lab.belief.learning import count_of, learned, restated
-from weld_twin_lab.belief.logistic import fitted
+from weld_twin_lab.belief.learning import (
+    bounded,
+    count_of,
+    fitted,
+    learned,
+    precise,
+    restated,
+    upper_limit,
+)
 from weld_twin_lab.belief.mix import SHARES, mixed
 from weld_twin_lab.belief.terms import TERMS
 

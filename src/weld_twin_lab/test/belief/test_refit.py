@@ -12,7 +12,6 @@ from weld_twin_core.diagnosis import calibration
 from weld_twin_core.diagnosis.calibration.weights import FILE
 from weld_twin_lab.belief import learning, study
 from weld_twin_lab.belief.rows import read_rows, write_rows
-from weld_twin_lab.cli.lab_jobs import belief
 from weld_twin_nodes.cli.main import main
 
 KEPT = Path(__file__).parents[4] / 'docs/results/belief'
@@ -27,7 +26,7 @@ def one_partition(monkeypatch):
 
 def test_the_shipped_weights_are_what_the_kept_cases_teach(monkeypatch):
     monkeypatch.setattr(learning, 'PARTITIONS', 2)
-    taught = study.fit(read_rows(KEPT / belief.LEARNED))
+    taught = study.fit(read_rows(KEPT / study.LEARNED))
     assert taught['card']['seeds'] == SHIPPED['card']['seeds']
     assert taught['sure_from'] == pytest.approx(SHIPPED['sure_from'], abs=6e-3)
     for kind, own in taught['statements'].items():
@@ -39,7 +38,7 @@ def test_the_tree_holds_less_than_a_megabyte_of_cases():
 
 
 def test_weights_are_fitted_anew_from_tables_by_one_command(tmp_path, capsys):
-    rows = [{**row, 'kind': 'single', 'sizes': [2.0]} for row in read_rows(KEPT / belief.LEARNED)]
+    rows = [{**row, 'kind': 'single', 'sizes': [2.0]} for row in read_rows(KEPT / study.LEARNED)]
     more = {
         'robot': 'ur5',
         'motion': 'free',

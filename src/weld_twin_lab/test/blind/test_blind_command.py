@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-from weld_twin_lab.blind import layout
+from weld_twin_lab.blind import seal
 from weld_twin_lab.study import DONE
 from weld_twin_msgs_py.bags import BagReader
 
@@ -40,7 +40,7 @@ def checked(tmp_path_factory):
 
 
 def test_a_check_leaves_a_score_of_every_case(checked):
-    score = json.loads((checked[0] / layout.SCORE).read_text())
+    score = json.loads((checked[0] / seal.SCORE).read_text())
     assert score['count'] == 2
     assert score['errors'] == {}
     assert {case['name'] for case in score['cases']} == {'case_0001', 'case_0002'}
@@ -52,18 +52,18 @@ def test_a_check_leaves_a_score_of_every_case(checked):
 def test_the_recordings_tell_nothing_of_the_truth(checked):
     cases, truths = checked[0] / 'cases', checked[0] / 'truths'
     for name in ('case_0001', 'case_0002'):
-        for use in (layout.TRAIN, layout.HOLDOUT):
+        for use in (seal.TRAIN, seal.HOLDOUT):
             with BagReader(cases / name / use) as bag:
                 assert set(bag.provenance) <= {'version', 'robot', 'static', 'schema'}
-        assert set(layout.read(cases / name / layout.CASE)) == {
+        assert set(seal.read(cases / name / seal.CASE)) == {
             'schema',
             'name',
             'align',
             'exclude',
             'known',
         }
-        assert not (cases / name / layout.TEST).exists()
-        assert (truths / name / layout.TEST).exists()
+        assert not (cases / name / seal.TEST).exists()
+        assert (truths / name / seal.TEST).exists()
 
 
 def test_a_check_run_again_does_nothing_anew(checked):

@@ -15,8 +15,16 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.effects import REGISTRY, effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.twin import Twin
-from weld_twin_lab.blind.ambiguous import CONSTRUCTIONS, construct
-from weld_twin_lab.blind.cause_sizes import FAMILIES, OUTSIDE, SIZES, draw, machines, scaled
+from weld_twin_lab.blind.cause_sizes import (
+    CONSTRUCTIONS,
+    FAMILIES,
+    OUTSIDE,
+    SIZES,
+    construct,
+    draw,
+    machines,
+    scaled,
+)
 from weld_twin_lab.blind.deck import KINDS, STRATA, Lot, lots
 from weld_twin_lab.blind.displacement import correlation, rigid, rms
 from weld_twin_lab.blind.recorded_motion import motion
@@ -33,8 +41,8 @@ from weld_twin_lab.blind.blind_cell import (
     record,
 )
 from weld_twin_lab.blind.making import draw_case
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import KNOWN
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 SIGMA = 2e-5

@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 from blind_verdicts import diagnosis, offset, truth
 
-from weld_twin_lab.blind.judging import judge
+from weld_twin_lab.blind.scoring import judge
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
 BASE = ('base_pose', None)

@@ -9,9 +9,8 @@ import pytest
 from blind_verdicts import diagnosis, offset, truth
 from scipy.stats import binomtest
 
-from weld_twin_lab.blind.judging import judge
-from weld_twin_lab.blind.scoring import measures, page
-from weld_twin_lab.blind.statistics import bootstrap, brier, calibration_error, share
+from weld_twin_lab.blind.measures import bootstrap, brier, calibration_error, share
+from weld_twin_lab.blind.scoring import judge, measures, page
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
 

@@ -14,7 +14,7 @@ import pytest
 from blind_verdicts import offset, truth
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.blind import layout, seal
+from weld_twin_lab.blind import seal
 
 
 @pytest.fixture
@@ -25,12 +25,12 @@ def sealed(tmp_path):
     for name in ('case_0001', 'case_0002'):
         (cases / name / 'train').mkdir(parents=True)
         (cases / name / 'train' / 'train.mcap').write_bytes(b'recording of ' + name.encode())
-        layout.write(truths / name / layout.TRUTH, truth('single', [offset('a')], name=name))
+        seal.write(truths / name / seal.TRUTH, truth('single', [offset('a')], name=name))
         entries.append(
             {'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)}
         )
-    layout.write(cases / layout.CASES, {'seal': seal.seal_of(entries), 'cases': entries})
-    layout.write(truths / layout.TRUTHS, {'seed': 1})
+    seal.write(cases / seal.CASES, {'seal': seal.seal_of(entries), 'cases': entries})
+    seal.write(truths / seal.TRUTHS, {'seed': 1})
     return cases, truths
 
 
@@ -39,7 +39,7 @@ def test_untouched_truths_open_in_the_order_of_the_cases(sealed):
 
 
 def test_the_seal_is_a_plain_hash_that_anyone_can_check(sealed):
-    listed = json.loads((sealed[0] / layout.CASES).read_text())
+    listed = json.loads((sealed[0] / seal.CASES).read_text())
     text = ''.join(f'{e["name"]} {e["case"]} {e["truth"]}\n' for e in listed['cases'])
     assert hashlib.sha256(text.encode()).hexdigest() == listed['seal']
 
@@ -55,10 +55,10 @@ def change(path):
     ('spoil', 'words'),
     [
         (lambda c, t: change(c / 'case_0002/train/train.mcap'), 'case of case_0002 was changed'),
-        (lambda c, t: change(t / 'case_0001' / layout.TRUTH), 'truth of case_0001 was changed'),
+        (lambda c, t: change(t / 'case_0001' / seal.TRUTH), 'truth of case_0001 was changed'),
         (lambda c, t: (c / 'case_0001/more').write_text(''), 'case_0001 was changed'),
         (lambda c, t: (t / 'case_0002').rename(t / 'lost'), 'truth of case_0002 is missing'),
-        (lambda c, t: (c / layout.CASES).write_text('{"schema": "x"}'), "has the schema 'x'"),
+        (lambda c, t: (c / seal.CASES).write_text('{"schema": "x"}'), "has the schema 'x'"),
     ],
 )
 def test_what_is_not_as_it_was_sealed_is_found(sealed, spoil, words):
@@ -69,29 +69,29 @@ def test_what_is_not_as_it_was_sealed_is_found(sealed, spoil, words):
 
 def test_a_truth_swapped_together_with_its_hash_is_found_by_the_seal(sealed):
     cases, truths = sealed
-    listed = json.loads((cases / layout.CASES).read_text())
-    change(truths / 'case_0001' / layout.TRUTH)
+    listed = json.loads((cases / seal.CASES).read_text())
+    change(truths / 'case_0001' / seal.TRUTH)
     listed['cases'][0]['truth'] = seal.digest(truths / 'case_0001')
-    (cases / layout.CASES).write_text(json.dumps(listed))
+    (cases / seal.CASES).write_text(json.dumps(listed))
     with pytest.raises(DataError, match='seal'):
         seal.opened(cases, truths)
 
 
 def test_a_list_sealed_anew_does_not_pass_for_the_one_published(sealed):
     cases, truths = sealed
-    published = json.loads((cases / layout.CASES).read_text())['seal']
+    published = json.loads((cases / seal.CASES).read_text())['seal']
     change(cases / 'case_0001' / 'train' / 'train.mcap')
-    listed = json.loads((cases / layout.CASES).read_text())
+    listed = json.loads((cases / seal.CASES).read_text())
     listed['cases'][0]['case'] = seal.digest(cases / 'case_0001')
     listed['seal'] = seal.seal_of(listed['cases'])
-    (cases / layout.CASES).write_text(json.dumps(listed))
+    (cases / seal.CASES).write_text(json.dumps(listed))
     assert seal.opened(cases, truths)
     with pytest.raises(DataError, match='seal'):
         seal.opened(cases, truths, published)
 
 
 def test_the_command_line_tells_of_a_broken_seal_in_one_line(sealed, weld_twin, tmp_path):
-    change(sealed[1] / 'case_0001' / layout.TRUTH)
+    change(sealed[1] / 'case_0001' / seal.TRUTH)
     result = weld_twin(
         'blind',
         'score',
@@ -111,9 +111,9 @@ def test_the_command_line_tells_of_a_broken_seal_in_one_line(sealed, weld_twin, 
 
 @pytest.mark.parametrize('place', ['cases/truths', 'truths', 'cases'])
 def test_a_diagnosis_that_could_read_the_truths_is_refused(sealed, weld_twin, tmp_path, place):
-    near = tmp_path / place / layout.TRUTHS
+    near = tmp_path / place / seal.TRUTHS
     near.parent.mkdir(exist_ok=True)
-    layout.write(near, {'seed': 1})
+    seal.write(near, {'seed': 1})
     result = weld_twin('blind', 'diagnose', sealed[0], '--out', tmp_path / 'out')
     assert result.code == 2
     assert '--allow-readable' in result.err
@@ -134,7 +134,7 @@ def test_the_diagnosis_loads_neither_plant_nor_truths():
     code = (
         'import sys, weld_twin_lab.blind.diagnosing; print([name for name in sys.modules if '
         'name.startswith("weld_twin_lab.plant") or name == "mujoco" or '
-        'name in ("weld_twin_lab.blind.making", "weld_twin_lab.blind.judging")])'
+        'name in ("weld_twin_lab.blind.making", "weld_twin_lab.blind.scoring")])'
     )
     out = subprocess.run(
         [sys.executable, '-c', code],

@@ -17,14 +17,6 @@ from weld_twin_core.twin.goal_correction import corrected_goal
 from weld_twin_core.twin.goal_motion import course
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_core.twin.twin import Twin
-from weld_twin_lab.campaigns.compensating.drawn_cells import (
-    HOMES,
-    RECORDED,
-    cell_of,
-    drawn_goal,
-    learned,
-    true_effects,
-)
 from weld_twin_lab.campaigns.compensator import (
     IN_A_CELL,
     counted,
@@ -32,6 +24,14 @@ from weld_twin_lab.campaigns.compensator import (
     table,
     unfinished,
     worse,
+)
+from weld_twin_lab.campaigns.drawn_cells import (
+    HOMES,
+    RECORDED,
+    cell_of,
+    drawn_goal,
+    learned,
+    true_effects,
 )
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.correcting import program_model
@@ -116,8 +116,7 @@ def test_one_miss_of_any_kind_fails_the_campaign(rows, changes, other):
 
 
 def test_whoever_goes_on_tries_what_is_missing_alone():
-    from weld_twin_lab.campaigns.compensating.drawn_cells import arms_of
-    from weld_twin_lab.campaigns.compensating.trial import CHANGES, Known
+    from weld_twin_lab.campaigns.drawn_cells import CHANGES, Known, arms_of
 
     (first, second), last = arms_of(2 * IN_A_CELL, IN_A_CELL, 7), {**CHANGE, 'change': CHANGES[-1]}
     assert (first.name, first.seed) == ('ur5', 7) and second.name != 'ur5'

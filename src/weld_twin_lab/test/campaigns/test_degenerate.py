@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weld_twin_lab.campaigns.fuzzing.recordings import (
+from weld_twin_lab.campaigns.poor_recordings import (
     ALIGNS,
     ERRORS,
     ROBOTS,

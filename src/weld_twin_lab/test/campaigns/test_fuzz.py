@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError, ModelError, PathError, TwinError
-from weld_twin_lab.campaigns.fuzzing import hunt
-from weld_twin_lab.campaigns.fuzzing.malicious import harms, try_one
-from weld_twin_lab.campaigns.fuzzing.targets import targets
+from weld_twin_lab.campaigns import hunt
+from weld_twin_lab.campaigns.broken_files import targets
+from weld_twin_lab.campaigns.hunt import harms, try_one
 from weld_twin_msgs_py.bags.reader import unlz4, unzstd, zstd
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects
@@ -134,7 +134,7 @@ def test_a_path_of_no_kind_is_refused(tmp_path, text):
 
 
 def test_the_campaign_keeps_its_result_and_touches_no_other_file(tmp_path, capsys):
-    out = tmp_path / 'fuzz.json'
+    out = tmp_path / 'hunt.json'
     words = ['campaign', 'fuzz', '--only', 'points', '--cases', '5', '--out', str(out)]
     (tmp_path / 'mine').write_text('keep')
     assert main([*words[:-1], str(tmp_path / 'mine')]) == 2

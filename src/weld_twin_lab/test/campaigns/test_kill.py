@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from weld_twin_lab.campaigns.killing.trial import Trial, try_once
+from weld_twin_lab.campaigns.kill import Trial, try_once
 
 pytestmark = pytest.mark.cells
 

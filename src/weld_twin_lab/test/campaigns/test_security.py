@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_core.errors import TwinError
-from weld_twin_lab.campaigns.securing.keys import keystore
+from weld_twin_lab.campaigns.secured import keystore
 from weld_twin_lab.campaigns.security import verdict
 from weld_twin_nodes.cli.in_process import weld_twin
 

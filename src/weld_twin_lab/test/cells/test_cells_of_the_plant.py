@@ -7,11 +7,10 @@ import pytest
 
 from weld_twin_core import forward
 from weld_twin_core.arm.robot import Robot
-from weld_twin_lab.cells.case import beyond_frames, opened
-from weld_twin_lab.cells.drawn import KINDS, cell, postures, really
-from weld_twin_lab.cells.table import named_as_tracked, page
-from weld_twin_lab.plant.camera import Eye, looking, seen
-from weld_twin_lab.plant.screws import Motion
+from weld_twin_lab.cells.case import KINDS, beyond_frames, cell, opened, postures, really
+from weld_twin_lab.cells.study import named_as_tracked, page
+from weld_twin_lab.plant.exponentials import Motion
+from weld_twin_lab.plant.tracker import Eye, looking, seen
 
 pytest.importorskip('mujoco')
 

@@ -14,9 +14,9 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_lab.contest.arms import page as told_page
 from weld_twin_lab.contest.course import commands, run_all
-from weld_twin_lab.contest.entrants import bootstrap, geometry, never_knows, zero_offset
+from weld_twin_lab.contest.course import page as told_page
+from weld_twin_lab.contest.entrants import geometry
 from weld_twin_lab.contest.open_form import (
     ContestAnswer,
     read_answer,
@@ -55,7 +55,7 @@ def case(tmp_path):
 @pytest.fixture
 def truth(case):
     folder, positions = case
-    nominal = never_knows.answer(read_case(folder)).predicted
+    nominal = geometry.never_knows(read_case(folder)).predicted
     return Sealed(
         {
             'kind': 'single',
@@ -105,7 +105,7 @@ def test_a_case_is_read_as_it_was_written_with_all_that_was_recorded(tmp_path):
 
 
 def test_geometry_finds_what_geometry_is(case, truth):
-    said = geometry.answer(read_case(case[0]))
+    said = geometry.geometry(read_case(case[0]))
     worth = point(said, truth)
     assert worth.detected and worth.family and worth.joint and not worth.sure_wrong
     assert worth.over_floor < 1.3
@@ -113,7 +113,7 @@ def test_geometry_finds_what_geometry_is(case, truth):
 
 
 def test_how_sure_an_answer_is_counts_by_cover_width_and_crps(case, truth, tmp_path):
-    write_answer(tmp_path / 'said', bootstrap.answer(read_case(case[0])))
+    write_answer(tmp_path / 'said', geometry.bootstrap(read_case(case[0])))
     said = read_answer(tmp_path / 'said', 80)
     worth = point(said, truth)
     assert 0.82 < worth.held < 0.97
@@ -122,21 +122,21 @@ def test_how_sure_an_answer_is_counts_by_cover_width_and_crps(case, truth, tmp_p
     assert worth.crps_m == pytest.approx(NOISE / np.sqrt(np.pi), rel=0.2)
     for factor in (0.3, 3.0):
         assert point(replace(said, sigma=factor * said.sigma), truth).crps_m > 1.1 * worth.crps_m
-    assert point(never_knows.answer(read_case(case[0])), truth).crps_m is None
+    assert point(geometry.never_knows(read_case(case[0])), truth).crps_m is None
 
 
 def test_the_scales_are_what_they_are(case, truth):
-    silent = point(never_knows.answer(read_case(case[0])), truth)
+    silent = point(geometry.never_knows(read_case(case[0])), truth)
     assert silent.left == pytest.approx(1.0)
     assert silent.detected and not silent.family and silent.belief == 0.0
-    wrong = point(zero_offset.answer(read_case(case[0])), truth)
+    wrong = point(geometry.zero_offset(read_case(case[0])), truth)
     assert wrong.sure_wrong and not wrong.family
 
 
 def test_names_beyond_three_of_one_cause_do_not_count(case, truth):
     names = [(effect, 'elbow_joint', 0.2) for effect in ('backlash', 'servo_lag', 'joint_offset')]
     hidden = (*names, ('link_length', 'elbow_joint', 0.1))
-    predicted = never_knows.answer(read_case(case[0])).predicted
+    predicted = geometry.never_knows(read_case(case[0])).predicted
     assert not point(ContestAnswer(predicted, (hidden,)), truth).family
     assert point(ContestAnswer(predicted, (hidden[1:],)), truth).family
 
@@ -181,7 +181,7 @@ def test_the_page_says_who_is_best_on_the_measured_arms(truth):
 
 
 def test_a_method_that_cannot_be_loaded_is_one_sentence(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'weld_twin_lab.contest.entrants.boosted_trees', None)
+    monkeypatch.setitem(sys.modules, 'weld_twin_lab.contest.entrants.learners', None)
     with pytest.raises(DataError, match=r"'boosted_trees' cannot be loaded .* leave it out"):
         commands(['never_knows', 'boosted_trees'], [])
 

@@ -21,9 +21,9 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.compensation import compensate
 from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
-from weld_twin_lab.blind.everywhere import small_errors
+from weld_twin_lab.blind.cause_sizes import small_errors
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 NOISE, TOLERANCE, STATIONS = 3e-5, 2e-4, 16

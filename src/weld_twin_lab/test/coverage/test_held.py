@@ -15,11 +15,10 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.blind.blind_cell import BlindCell, Take
 from weld_twin_lab.blind.deck import Lot
 from weld_twin_lab.blind.making import SealedCase, one_arm
-from weld_twin_lab.coverage.held import inside_region
-from weld_twin_lab.coverage.oracle import oracle_sigma
+from weld_twin_lab.coverage.held import inside_region, oracle_sigma
 from weld_twin_lab.coverage.sealed import of_case
-from weld_twin_lab.coverage.table import page, promise_table, summaries
-from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.coverage.study import page, promise_table, summaries
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 LOT = Lot('single', 'one', 'stations', ('joint_offset',), (1,))

@@ -10,9 +10,9 @@ import pytest
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.diagnosis.result import MISTAKES
 from weld_twin_core.twin.twin import Twin
-from weld_twin_lab.gate import sound
+from weld_twin_lab.gate import mistakes
 from weld_twin_lab.gate.mistakes import KINDS, MOVING_ONLY, Hidden
-from weld_twin_lab.gate.table import result
+from weld_twin_lab.gate.trials import result
 from weld_twin_nodes.cli import main
 
 pytest.importorskip('mujoco', reason='cases are simulated with MuJoCo')
@@ -20,7 +20,7 @@ pytest.importorskip('mujoco', reason='cases are simulated with MuJoCo')
 
 @pytest.fixture(scope='module')
 def recording():
-    return sound.draw(np.random.default_rng(4), rich=True)
+    return mistakes.draw(np.random.default_rng(4), rich=True)
 
 
 ELSEWHERE = {'wrong_fixture', 'intrinsics', 'target_scale', 'target_mirrored', 'cameras_swapped'}
@@ -73,7 +73,7 @@ def test_a_joint_that_slips_takes_position_and_turn_along(recording):
 
 
 def test_the_same_draw_is_the_same_recording():
-    first, second = (sound.draw(np.random.default_rng(9)) for _ in range(2))
+    first, second = (mistakes.draw(np.random.default_rng(9)) for _ in range(2))
     assert first.about == second.about
     assert np.array_equal(first.recording.measured.position, second.recording.measured.position)
 

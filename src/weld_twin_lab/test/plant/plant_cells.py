@@ -5,8 +5,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 HALF = np.pi / 2.0

@@ -9,8 +9,8 @@ from plant_cells import UR5
 import weld_twin_core as wt
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import REGISTRY
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.plant_recording import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 COMMON = [

@@ -21,7 +21,7 @@ from plant_cells import (
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.exponentials import Command
 
 
 def _ramp(joint, speed, duration=3.0):

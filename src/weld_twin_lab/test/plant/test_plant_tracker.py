@@ -9,7 +9,7 @@ import pytest
 from plant_cells import UR5, dh_positions, record, stations, weave
 from scipy.spatial.transform import Rotation
 
-from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.tracker import Tracker
 
 

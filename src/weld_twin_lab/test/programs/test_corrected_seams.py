@@ -7,10 +7,8 @@ import pytest
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_lab.programs.cells import CELLS, robots_of
-from weld_twin_lab.programs.correction_table import counted, page, totals
-from weld_twin_lab.programs.path_accuracy import path_accuracy
-from weld_twin_lab.programs.plain_arm import tool_pose
-from weld_twin_lab.programs.plain_controller import driven
+from weld_twin_lab.programs.corrections import counted, page, path_accuracy, totals
+from weld_twin_lab.programs.plain_controller import driven, tool_pose
 
 
 def seam(after, outcome='corrected', language='krl', before=2e-4, true=1e-5):

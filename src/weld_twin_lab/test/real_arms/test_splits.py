@@ -12,11 +12,19 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.coverage.touched import postures_at
-from weld_twin_lab.real_arms.goals import measures
-from weld_twin_lab.real_arms.poor import paired, plain_axis
-from weld_twin_lab.real_arms.sources import places_of, servo, socket_robot, touches
-from weld_twin_lab.real_arms.splits import LEAST, among, halves, kept_back, splits
+from weld_twin_lab.coverage.others import postures_at
+from weld_twin_lab.real_arms.poor import measures, paired, plain_axis
+from weld_twin_lab.real_arms.sources import (
+    LEAST,
+    among,
+    halves,
+    kept_back,
+    places_of,
+    servo,
+    socket_robot,
+    splits,
+    touches,
+)
 from weld_twin_lab.real_arms.unseen import traceback_text
 
 

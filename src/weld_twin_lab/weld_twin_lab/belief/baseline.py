@@ -8,19 +8,31 @@ The table holds answers alone, so that engines are compared case by case, whatev
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from operator import attrgetter
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from weld_twin_core.diagnosis.calibration.features import WIDEST
-from weld_twin_msgs_py.files import markdown
+import numpy as np
 
-from ..blind.ambiguous import Site
-from ..blind.judging import CONFIDENT, is_sure
-from ..blind.statistics import Estimate, bootstrap, calibration_error, share
-from .levels_of_truth import Levels, alike_by_structure, levels_of
+from weld_twin_core.diagnosis.calibration.features import WIDEST
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files import markdown
+from weld_twin_nodes.cli.given import pair
+from weld_twin_nodes.offline.task_pool import Task
+
+from ..blind.blind_cell import take
+from ..blind.cause_sizes import Site
+from ..blind.making import MOTIONS_OF, truth_of
+from ..blind.measures import Estimate, bootstrap, calibration_error, share
+from ..blind.scoring import CONFIDENT, is_sure
+from ..study import Study, require_simulator, tabled
+from .levels_of_truth import Levels, alike_by_structure, levels_of, whole
 from .mix import MOST as CAUSES
-from .rows import rounded
-from .whole import whole
+from .mix import SEVERAL, SPANS, drawn
+from .rows import read_rows, rounded, write_rows
+from .trial import diagnosed, recordings_of, said, tried
 
 MOST = 2 * CAUSES
 """Effects of a model that are kept; more are many small errors."""
@@ -223,3 +235,161 @@ def page(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     first = next(iter(each.values()))
     body = [(key, *(str(own[key]) for own in each.values())) for key in first]
     return markdown.table(('measure', *each), *body)
+
+
+RECORDINGS = 4
+"""Recordings of a cell at the most."""
+FALL = 0.1
+"""Probability that a sure cause may lose by a recording more."""
+SAME = 1e-6
+"""Probability by which answers on the same recordings in another order may differ."""
+
+
+def grown(seed: int, number: int) -> dict[str, Any]:
+    """
+    Return what is said of a cell with one recording, two, ..., and with all in reverse.
+
+    seed, number: of the cell, as `mix.drawn` takes them.
+    """
+    name = f'{seed}/{number}'
+    try:
+        case = drawn(seed, number, SEVERAL).case
+    except Exception as error:
+        return {'name': name, 'error': f'not drawn: {error}'}
+    rng = np.random.default_rng([seed, 7000 + number])
+    kinds = MOTIONS_OF.get(case.lot.motion, (case.lot.motion,))
+    first = 1 + len(case.also)
+    more = [
+        take(case.cell, kinds[k % len(kinds)], float(rng.uniform(*SPANS)), rng)
+        for k in range(first, RECORDINGS)
+    ]
+    recordings = recordings_of(case, more)
+    orders = [*(range(k + 1) for k in range(RECORDINGS)), range(RECORDINGS)[::-1]]
+    try:
+        answers = [said(diagnosed(case, [recordings[k] for k in order])) for order in orders]
+    except Exception as error:
+        return {'name': name, 'error': f'{type(error).__name__}: {error}'}
+    kept = [{key: one[key] for key in ('verdict', 'model', 'unsound')} for one in answers]
+    truth = truth_of(name, case)
+    return {'name': name, 'error': None, 'truth': truth, 'told': kept[:-1], 'turned': kept[-1]}
+
+
+class GrowingStep(NamedTuple):
+    """
+    A cause that was sure and right, before and after a recording more.
+
+    ``after`` is 0 where no reported set holds the cause any more; ``sure`` tells whether it still is.
+    """
+
+    name: str
+    recordings: int
+    cause: Site
+    before: float
+    after: float
+    sure: bool
+
+    @property
+    def fell(self) -> bool:
+        """Return whether it lost much."""
+        return self.after < self.before - FALL
+
+
+def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
+    """
+    Yield every right cause that was sure, with what a recording more made of it.
+
+    row: as `grown` gives it, without an error.
+    """
+    truth = row['truth']
+    for effect, joint in truth['sites']:
+        alike = alike_by_structure(truth['robot'], (effect, joint))
+        beliefs = [_believed(one['verdict'], alike) for one in row['told']]
+        for k, ((before, sure), (after, still)) in enumerate(pairwise(beliefs)):
+            if sure:
+                yield GrowingStep(row['name'], k + 1, (effect, joint), before, after, still)
+
+
+def _believed(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float, bool]:
+    """Return how probable a cause is reported, by its whole set, and whether it is sure."""
+    best = (0.0, False)
+    for cause in verdict['causes']:
+        names = {(item['effect'], item['joint']) for item in cause['name']}
+        if names & alike:
+            best = max(best, (float(cause['probability']), bool(cause['sure'])))
+    return best
+
+
+def apart(row: Mapping[str, Any]) -> float:
+    """
+    Return by how much probabilities differ where only the order does; 1 where names do.
+
+    row: as `grown` gives it, without an error.
+    """
+    one, other = (
+        {
+            (
+                frozenset((i['effect'], i['joint']) for i in cause['name']),
+                bool(cause.get('rest')),
+            ): (cause['probability'] or 0.0)
+            for cause in answer['verdict']['causes']
+        }
+        for answer in (row['told'][-1], row['turned'])
+    )
+    if one.keys() != other.keys() or row['told'][-1]['unsound'] != row['turned']['unsound']:
+        return 1.0
+    return max((abs(p - other[key]) for key, p in one.items()), default=0.0)
+
+
+def growing_page(rows: Sequence[Mapping[str, Any]]) -> str:
+    """
+    Return the measures, and every sure cause that fell.
+
+    rows: as `grown` gives them.
+    """
+    good = [row for row in rows if not row['error']]
+    every = [step for row in good for step in steps(row)]
+    measures = {
+        'sure causes that fall by more than 0.1': share([step.fell for step in every]),
+        'sure causes that lose their name': share([step.after == 0.0 for step in every]),
+        'sure causes that are sure no longer': share([not step.sure for step in every]),
+        'cells whose order changes a name': share([apart(row) == 1.0 for row in good]),
+        'cells whose order moves a probability': share([apart(row) > SAME for row in good]),
+    }
+    lines = [(key, str(value)) for key, value in measures.items()]
+    fallen = [step for step in every if step.fell]
+    lost = '\n' + tabled(FALLEN, fallen) if fallen else ''
+    return markdown.table(('measure', 'value'), *lines) + lost
+
+
+FALLEN: dict[str, Callable[[GrowingStep], object]] = {
+    'cell': attrgetter('name'),
+    'recordings': attrgetter('recordings'),
+    'cause': lambda step: f'{step.cause[0]} of {step.cause[1]}',
+    'sure with': lambda step: f'{step.before:.2f}',
+    'one more': lambda step: f'{step.after:.2f}',
+}
+"""Columns of the table of sure causes that fell."""
+
+
+def run(study: Study) -> None:
+    """Diagnose what is not diagnosed yet, score, write and print the page."""
+    args = study.args
+    if args.cases:
+        require_simulator()
+    if args.growing:
+        if not args.cases or args.beside:
+            raise DataError('--growing takes --cases and no --beside')
+        tasks = [Task(grown, (args.seed, k), f'cell {k}') for k in range(args.cases)]
+        rows = study.tasks(tasks, 'diagnosing')
+        write_rows(study.out / 'growing.jsonl', rows)
+        study.write('growing', page=growing_page(rows))
+        return
+    named = [pair(item, '--beside', 'NAME=TABLE') for item in args.beside]
+    tables = {name: read_rows(Path(table)) for name, table in named}
+    if args.cases:
+        tasks = [Task(tried, (args.seed, k, SEVERAL), f'cell {k}') for k in range(args.cases)]
+        tables['this engine'] = [brief(row) for row in study.tasks(tasks, 'diagnosing')]
+        write_rows(study.out / 'answers.jsonl', tables['this engine'])
+    if not tables:
+        raise DataError('there is nothing to score; give --cases, or --beside, or both')
+    study.write('baseline', page=page(tables))

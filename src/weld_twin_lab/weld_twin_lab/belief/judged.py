@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
 
-from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
-from .levels_of_truth import alike_by_structure, levels_of, numbers
-from .there import HALF, LARGE
-from .there import right as right_everywhere
-from .whole import FEW, whole
+from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge
+from .levels_of_truth import FEW, alike_by_structure, levels_of, numbers, whole
+from .visible import HALF, LARGE
+from .visible import right as right_everywhere
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""

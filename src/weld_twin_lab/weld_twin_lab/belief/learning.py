@@ -10,16 +10,165 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import beta
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.calibration.features import ONLY, of_whole
 from weld_twin_core.diagnosis.calibration.weights import SCHEMA
 from weld_twin_core.errors import DataError
 
-from .bound import Bound, bounded, precise
 from .judged import Example
-from .logistic import Weights, fitted
 from .terms import CAUSE_RISK, OF_FAMILIES, RISK, TERMS
+
+
+class Weights(NamedTuple):
+    """Bias and weights, on columns of mean zero and spread one."""
+
+    bias: float
+    slopes: Array
+
+
+def fitted(
+    columns: Array,
+    right: Array | NDArray[np.bool_],
+    signs: Array,
+    ridge: float,
+    weight: Array,
+    prior: Array | None = None,
+    near: Weights | None = None,
+) -> Weights:
+    """
+    Return the weights of least penalised log loss.
+
+    columns: standardised, shape (N, P).
+    right: shape (N,).
+    signs: 1 where a weight may not be negative, -1 where it may not be positive, 0 where it is
+    free, shape (P,).
+    ridge: of half the squared distance from the prior, against log loss in nats.
+    weight: of every example, shape (N,).
+    prior: weights that the ridge pulls to, shape (P,); zeros when left out.
+    near: weights to begin with, where those of nearly the same examples are known.
+    """
+    prior = np.zeros(columns.shape[1]) if prior is None else prior
+    # One more case of each outcome, with every sign at its middle: few cases are never certain.
+    columns = np.concatenate([columns, np.zeros((2, columns.shape[1]))])
+    target = np.concatenate([np.asarray(right, dtype=float), [0.0, 1.0]])
+    weight = np.concatenate([weight, [1.0, 1.0]])
+    share = float(np.clip((weight * target).sum() / weight.sum(), 0.02, 0.98))
+
+    def loss(x: Array) -> tuple[float, Array]:
+        odds = x[0] + columns @ x[1:]
+        off = x[1:] - prior
+        value = (weight * (np.logaddexp(0.0, odds) - target * odds)).sum()
+        error = weight * (1.0 / (1.0 + np.exp(-odds)) - target)
+        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * off])
+        return float(value + 0.5 * ridge * off @ off), slope
+
+    bounds = [(None, None)] + [
+        (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
+    ]
+    near = near or Weights(float(np.log(share / (1.0 - share))), prior)
+    start = np.concatenate([[near.bias], near.slopes])
+    solution = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
+    return Weights(float(solution.x[0]), np.asarray(solution.x[1:]))
+
+
+def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array) -> float:
+    """
+    Return the mean log loss in nats.
+
+    probability, right, weight: shape (N,).
+    """
+    clipped = np.clip(probability, 1e-4, 1.0 - 1e-4)
+    loss = -np.where(np.asarray(right, dtype=bool), np.log(clipped), np.log(1.0 - clipped))
+    return float((weight * loss).sum() / weight.sum())
+
+
+class Bound(NamedTuple):
+    """A threshold, and what is known of it."""
+
+    sure_from: float
+    """Above 1 where no threshold keeps the risk: then nothing is told as sure."""
+    wrong: int
+    cases: int
+    """Sure and wrong at this threshold, of how many cases."""
+    expected: float
+    """Bound on the probability that one more such case is sure and wrong."""
+    most: float
+    """Upper limit of the share that is sure and wrong, with 90 % confidence."""
+    sure: float
+    """Share of the cases that are sure."""
+
+
+NEVER = 1.01
+"""A threshold that no probability reaches."""
+GRID = np.linspace(0.998, 0.5, 250)
+"""Thresholds tried, chosen before any data: two in a thousand apart."""
+ERROR = 0.1
+"""How often the upper limit of the share may fail to hold."""
+
+
+def bounded(probability: Array, right: Array, risk: float) -> Bound:
+    """
+    Return the lowest threshold at which one more case is sure and wrong too seldom to matter.
+
+    probability: of cases that took no part in the fit, shape (N,).
+    right: shape (N,).
+    risk: probability that a case may be sure and wrong.
+    """
+    p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
+    best = NEVER
+    for threshold in GRID:
+        wrong = int(((p >= threshold) & ~good).sum())
+        if (wrong + 1) / (p.size + 1) > risk:
+            break
+        best = float(threshold)
+    return at(best, p, good)
+
+
+def precise(probability: Array, right: Array, risk: float) -> Bound:
+    """
+    Return the lowest threshold at which one more sure case is wrong too seldom to matter.
+
+    probability: of cases that took no part in the fit, shape (N,).
+    right: shape (N,).
+    risk: share of the sure cases that may be wrong.
+    """
+    p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
+    best = NEVER
+    for threshold in GRID:
+        sure = p >= threshold
+        if int((sure & ~good).sum()) + 1 <= risk * (int(sure.sum()) + 1):
+            best = float(threshold)
+    return at(best, p, good)
+
+
+def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
+    """
+    Return what is known of a threshold.
+
+    probability: shape (N,).
+    right: shape (N,).
+    """
+    sure = probability >= threshold
+    wrong, cases = int((sure & ~right).sum()), probability.size
+    expected = (wrong + 1) / (cases + 1)
+    return Bound(
+        threshold, wrong, cases, expected, upper_limit(wrong, cases, ERROR), float(sure.mean())
+    )
+
+
+def upper_limit(wrong: int, cases: int, error: float) -> float:
+    """
+    Return the exact upper limit of a share.
+
+    error: probability that the share is larger.
+    """
+    if wrong >= cases:
+        return 1.0
+    return float(beta.ppf(1.0 - error, wrong + 1, cases - wrong))
+
 
 RIDGE = 10.0
 """Of half the squared weights, against log loss in nats: each weight moves as far as some tens of

@@ -19,12 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..blind.ambiguous import CONSTRUCTIONS
-from ..blind.cause_sizes import FAMILIES, MOVING, Cause, site
+from ..blind.blind_cell import WAYS, poorer
+from ..blind.cause_sizes import CONSTRUCTIONS, FAMILIES, MOVING, Cause, site, uneven_errors
 from ..blind.deck import KINDS, ROBOTS, Deck, Lot, lots
-from ..blind.everywhere import uneven_errors
 from ..blind.making import SealedCase, draw_case
-from ..blind.poor_motion import WAYS, poorer
 
 USUAL, SEVERAL, EVERYWHERE = 'usual', 'several', 'everywhere'
 """Mixes of cases."""

@@ -5,26 +5,164 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..blind.judging import NOT_IN_LIBRARY
-from ..blind.statistics import brier, calibration_error, share
+from ..blind.measures import (
+    Measure,
+    Question,
+    bootstrap,
+    brier,
+    calibration_error,
+    measure_table,
+    measured,
+    share,
+)
+from ..blind.scoring import NOT_IN_LIBRARY
+from ..study import Study, require_simulator, tabled
 from . import learning, terms
-from .bound import upper_limit
-from .goals import goal_measures
 from .judged import Example, examples_of, kept
-from .logistic import log_loss
+from .learning import log_loss, unseen, upper_limit
 from .mix import USUAL
 from .oracle import certainty
-from .rows import seeds_of
+from .rows import read_rows, seeds_of, write_rows
 from .trial import tried
+
+Kept = Mapping[str, Any]
+SEEN, PLAIN = 1.0, 3.0
+"""Effect RMS over noise from which a cause can be seen, and from which it is plain."""
+ORACLE = 0.99
+"""Probability from which the oracle is sure."""
+
+
+def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
+    """
+    Return the measures of verdicts and of levels.
+
+    rows: as `judged.kept` gives them; none of them was learned from.
+    """
+    single = _of('single')
+    named = [r for r in rows if single(r) and r['status'] != 'none']
+    seconds = [float(r['seconds']) for r in rows]
+    return [
+        *measured(CAUSES, rows),
+        # The mean belief in the true family, as fault isolation benchmarks have it.
+        *(
+            Measure(key, title, bootstrap([float(r[of]) for r in named if of in r], np.mean), goal)
+            for key, title, of, goal in FAMILY
+        ),
+        Measure('seconds', 'processor seconds of a diagnosis, median', bootstrap(seconds)),
+        *measured(FOREIGN, rows),
+    ]
+
+
+def _of(*kinds: str) -> Callable[[Kept], bool]:
+    """Return what tells cases of some kinds whose causes can all be seen."""
+    return lambda row: row['kind'] in kinds and min(row['sizes']) >= SEEN
+
+
+_known = _of('single', 'double', 'triple', 'several')
+
+
+def _causes(count: int, least: float, *but: str) -> Callable[[Kept], bool]:
+    """Return what tells cases with so many causes of the library, each as large as the least."""
+    others = {*NOT_IN_LIBRARY, *but}
+
+    def asked(row: Kept) -> bool:
+        sizes = row['sizes']
+        return len(sizes) == count and min(sizes) >= least and row['kind'] not in others
+
+    return asked
+
+
+def _foreign(row: Kept) -> bool:
+    return row['kind'] in NOT_IN_LIBRARY
+
+
+CAUSES = (
+    Question(
+        'sure_wrong',
+        'sure and wrong',
+        lambda row: True,
+        lambda row: row['sure'] and not row['right'],
+        0.002,
+        False,
+    ),
+    Question(
+        'single_sure',
+        'one cause in the library, 1 noise or more: right and sure',
+        _causes(1, SEEN),
+        lambda row: row['right'] and row['sure'],
+        0.70,
+    ),
+    Question(
+        'single_cause_sure',
+        'the same: its cause named, right and sure',
+        _causes(1, SEEN),
+        lambda row: any(
+            kind == 'name' and right and sure for kind, _, right, _, sure in row['examples']
+        ),
+        0.80,
+    ),
+    Question('single_right', 'the same: right', _causes(1, SEEN), itemgetter('right')),
+    Question(
+        'oracle_sure',
+        'one or two causes of which an oracle is sure: right and sure',
+        lambda row: _known(row) and (row.get('oracle') or 0.0) >= ORACLE,
+        lambda row: row['right'] and row['sure'],
+        0.95,
+    ),
+    Question(
+        'double_named',
+        'two causes, each 3 noise: both named',
+        _causes(2, PLAIN, 'ambiguous'),
+        itemgetter('named'),
+        0.90,
+    ),
+    Question(
+        'triple_named',
+        'three causes, each 3 noise: all named',
+        _causes(3, PLAIN, 'ambiguous'),
+        itemgetter('named'),
+        0.85,
+    ),
+    Question(
+        'needless_unknown',
+        'causes in the library, 1 noise or more: needlessly unknown',
+        _known,
+        lambda row: row['status'] == 'unknown',
+        0.03,
+        False,
+    ),
+)
+"""What is asked of causes that the library has."""
+FAMILY = (
+    ('fia', 'mean belief in the true family, one cause; a set counts whole', 'family', 0.92),
+    ('fia_shared', 'the same, a set shared among its members', 'family_shared', 0.85),
+)
+"""What is believed of the family of a single cause: key, title, what of a case, goal."""
+FOREIGN = (
+    Question(
+        'honest',
+        'withheld or outside: unknown, a set that holds it, or as good on sealed data',
+        _foreign,
+        lambda row: row['honest'] or row['status'] == 'unknown',
+        0.95,
+    ),
+    Question('place', 'the same: place right, first answer', _foreign, itemgetter('place'), 0.90),
+    Question('dependence', 'the same: dependence right', _foreign, itemgetter('dependence'), 0.87),
+)
+"""The same of causes that it does not have."""
+
 
 COVERAGE = 0.7
 """Share of the statements, the surest first, at which the risk is quoted."""
@@ -148,3 +286,130 @@ def _risk_at(reported: Array, right: NDArray[np.bool_]) -> float:
 def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
     own = {key: row[key] for key in ('name', 'kind', 'robot', 'motion', 'truth', 'sizes')}
     return {**own, 'said': f'{row["status"]} {row["said"]}'.strip()}
+
+
+def page(result: Mapping[str, Any]) -> str:
+    """
+    Return the whole in Markdown.
+
+    result: as `study.judged` gives it.
+    """
+    return '\n'.join(
+        [
+            *_bounds(result['learned_from'], result['judged_on']),
+            '',
+            tabled(STATEMENTS, result['statements'].items()),
+            *(_beside_goals(result) if result['goals'] else ()),
+        ]
+    )
+
+
+def _beside_goals(result: Mapping[str, Any]) -> list[str]:
+    """Return the measures beside their goals, and what was sure and wrong."""
+    return [
+        'Beside the goals:',
+        '',
+        measure_table(result['goals']),
+        *_failures(result['wrong_and_sure']),
+    ]
+
+
+def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
+    """Return what was learned from, and from where a statement is told as sure."""
+    by = (
+        f'judged on {tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was '
+        'learned from'
+        if tried['cases']
+        else 'each judged by weights that had not seen it'
+    )
+    return [
+        f'{taught["weights"]} weights, learned from {taught["cases"]} cases of seed '
+        f'{_listed(taught["seeds"])}; {by}. From where a statement is told as sure:',
+        '',
+        tabled(BOUNDS, taught['bounds'].items()),
+    ]
+
+
+def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
+    if not listed:
+        return ['No case was sure and wrong.', '']
+    return ['Sure and wrong:', '', tabled(FAILURES, listed)]
+
+
+def _percent(value: float) -> str:
+    return f'{100.0 * value:.1f} %'
+
+
+def _listed(values: Sequence[object]) -> str:
+    return ', '.join(map(str, values))
+
+
+BOUNDS: dict[str, Callable[[Any], object]] = {
+    'statement': lambda row: row[0],
+    'number': lambda row: f'{row[1]["cases"]:.0f}',
+    'sure from': lambda row: (
+        'never: too few cases' if row[1]['sure_from'] > 1.0 else f'{row[1]["sure_from"]:.3f}'
+    ),
+    'sure': lambda row: _percent(row[1]['sure']),
+    'of these wrong': lambda row: f'{row[1]["wrong"]:.0f}',
+}
+"""Columns of the table of bounds, each a name and its bound."""
+STATEMENTS: dict[str, Callable[[Any], object]] = {
+    'statements': lambda row: row[0],
+    'number': lambda row: row[1]['statements'],
+    'right': lambda row: _percent(row[1]['right'] / row[1]['statements']),
+    'calibration error': lambda row: f'{row[1]["ece"]["value"]:.3f}',
+    'log loss': lambda row: f'{row[1]["log_loss"]:.3f}',
+    'sure': lambda row: _percent(row[1]['sure']['value']),
+    'sure and wrong': lambda row: row[1]['sure_and_wrong'],
+    'wrong among the surest 70 %': lambda row: _percent(row[1]['wrong_at_70']),
+}
+"""The same of kinds of statements."""
+FAILURES: dict[str, Callable[[Any], object]] = {
+    'case': itemgetter('name'),
+    **{key: itemgetter(key) for key in ('kind', 'robot', 'motion', 'truth')},
+    'sizes [noise]': lambda item: ', '.join(f'{size:.1f}' for size in item['sizes']),
+    'said': itemgetter('said'),
+}
+"""Columns of the table of cases that were sure and wrong."""
+
+
+LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
+
+
+def run(study: Study) -> None:
+    """Make what is not made yet, fit, judge, write and print the page."""
+    args = study.args
+    if args.cases or args.held_out:
+        require_simulator()
+    if args.seed == args.held_out_seed:
+        raise DataError(
+            '--seed and --held-out-seed must differ: a case is learned from or judged on'
+        )
+    taught = [row for table in args.learn_from for row in read_rows(Path(table))]
+    asked = [row for table in args.judge_on for row in read_rows(Path(table))]
+    with study.runner('diagnosing') as runner:
+        taught += rows_of(args.seed, args.cases, runner, args.mix)
+        drawn = rows_of(args.held_out_seed, args.held_out, runner, args.mix)
+        asked += [*with_oracle(drawn[: args.oracle], runner), *drawn[args.oracle :]]
+    _refuse_shared(taught, asked)
+    write_rows(study.out / LEARNED, taught)
+    if asked:
+        write_rows(study.out / JUDGED, asked)
+    content = fit(taught, args.risk)
+    examples = examples_of(asked) if asked else unseen(examples_of(taught), content)
+    result = judged(content, asked, examples)
+    study.write('weights', content)
+    study.write('results', result)
+    study.write('belief', page=page(result))
+
+
+def _refuse_shared(taught: Sequence[Kept], asked: Sequence[Kept]) -> None:
+    """Refuse cases that are learned from and judged on, and none to learn from."""
+    shared = {row['name'] for row in taught} & {row['name'] for row in asked}
+    if shared:
+        raise DataError(
+            f'case {min(map(str, shared))} is in a table to learn from and in one to judge on'
+        )
+    if not taught:
+        raise DataError('there are no cases to learn from; give --cases or --learn-from')

@@ -15,17 +15,15 @@ from weld_twin_core.diagnosis.evidence import Alternative, Evidence
 from weld_twin_core.effects.registry import effects_from_list
 from weld_twin_core.recording import Recording
 
-from ..blind import layout
-from ..blind.achieved import counted, gap_on, nominal_on
+from ..blind import seal
 from ..blind.blind_cell import Take, as_recording, floor, record
 from ..blind.cause_sizes import Cause
-from ..blind.displacement import rms
+from ..blind.displacement import counted, gap_on, nominal_on, rms
 from ..blind.making import SealedCase, truth_of
 from ..study import engine_digest
+from .levels_of_truth import FEW
 from .mix import EVERYWHERE, SEVERAL, USUAL, drawn
-from .there import there
-from .visible import shown
-from .whole import FEW
+from .visible import shown, there
 
 
 def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
@@ -99,10 +97,10 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
     more: further ones of the same truth.
     """
     also = [
-        as_recording(f'{layout.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
+        as_recording(f'{seal.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
         for k, taken in enumerate((*case.also, *more))
     ]
-    return [_recorded(case, layout.TRAIN), *also]
+    return [_recorded(case, seal.TRAIN), *also]
 
 
 def diagnosed(
@@ -120,13 +118,13 @@ def diagnosed(
         align=frozenset(cell.align),
         known=effects_from_list([dict(item) for item in cell.known], cell.robot),
         exclude=case.excluded,
-        holdout=[_recorded(case, layout.HOLDOUT)] if held_out else [],
+        holdout=[_recorded(case, seal.HOLDOUT)] if held_out else [],
         experiment=False,
     )
 
 
 def _recorded(case: SealedCase, use: str) -> Recording:
-    taken = {layout.TRAIN: case.train, layout.HOLDOUT: case.holdout, layout.TEST: case.test}[use]
+    taken = {seal.TRAIN: case.train, seal.HOLDOUT: case.holdout, seal.TEST: case.test}[use]
     return as_recording(use, record(case.cell, case.causes, taken))
 
 
@@ -134,9 +132,9 @@ def _sealed(case: SealedCase, truth: dict[str, Any], diagnosis: Diagnosis) -> di
     """Return what is left on the recording that the diagnosis never saw, RMS [m]."""
     if diagnosis.status == 'unsound':
         return {}
-    test = _recorded(case, layout.TEST)
+    test = _recorded(case, seal.TEST)
     good = counted(test, truth['outliers'])
-    cell, train = case.cell, _recorded(case, layout.TRAIN)
+    cell, train = case.cell, _recorded(case, seal.TRAIN)
     bare = nominal_on(cell.robot, diagnosis.model.known, train, cell.align)
 
     def remaining(model: Model) -> float:

@@ -15,12 +15,10 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files.whole_files import write_json
 
-from . import race_table
 from .arms import calibrated_arm
-from .inverse import inverse
-from .kinematics import batches, single
+from .kinematics import batches, inverse, single
 from .peers import PACKAGES, Peer, find_peers
-from .race import Workload, race
+from .race import Workload, brief, lines, page, race
 
 
 @dataclass(frozen=True)
@@ -53,10 +51,10 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
     outcomes = []
     for workload in _workloads(effort, peers):
         outcomes.append(race(workload, effort.rounds, effort.least))
-        for line in race_table.lines(outcomes[-1]):
+        for line in lines(outcomes[-1]):
             say(line)
-    (folder / 'benchmark.md').write_text(race_table.page(outcomes), encoding='utf-8')
-    (folder / 'brief.md').write_text(race_table.brief(outcomes), encoding='utf-8')
+    (folder / 'benchmark.md').write_text(page(outcomes), encoding='utf-8')
+    (folder / 'brief.md').write_text(brief(outcomes), encoding='utf-8')
     results = {
         'schema': 'weld_twin/benchmark/1',
         'machine': _machine(),

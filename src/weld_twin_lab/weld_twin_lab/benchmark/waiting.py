@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,13 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from weld_twin_core.errors import DataError
 
-from ..study import engine_digest, tabled
+from ..study import Study, engine_digest, tabled
 from . import waiting_data as data
 from .costs import Cost, cost_of
 
@@ -267,3 +269,31 @@ COLUMNS: dict[str, Callable[[Entry], object]] = {
     'measured': _when,
 }
 """Columns of the table."""
+
+
+def run(study: Study) -> None:
+    """Measure all jobs and print the table."""
+    args = study.args
+    kept = _kept(study.out / 'waits.json') if args.only else []
+    base = Path(args.base) if args.base else None
+
+    def keep(entry: Entry) -> None:
+        nonlocal kept
+        study.tell(f'{entry["job"]}: {entry}')
+        kept = merged(kept, [entry])
+        study.write('waits', kept, page(kept), say=False)
+
+    with TemporaryDirectory() as folder:
+        measured(base, Path(folder), max(args.runs, 1), args.only, keep)
+    print(summary(kept))
+
+
+def _kept(file: Path) -> list[Entry]:
+    """Return the rows that were measured before; none where there are none."""
+    if not file.exists():
+        return []
+    try:
+        entries: list[Entry] = json.loads(file.read_text(encoding='utf-8'))
+    except ValueError:
+        raise DataError(f"'{file}' is damaged; remove it to measure all jobs anew") from None
+    return entries

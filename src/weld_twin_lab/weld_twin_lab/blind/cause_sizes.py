@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.chain import frames
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.predicting import plausible_arm
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import plausible as plausible_of
@@ -322,3 +325,121 @@ AT_REST = (
 """Causes that stations at rest show of any arm, and that no frame is one with."""
 MOVING = frozenset(name for name, typical in CAUSES.items() if typical.moving)
 """Causes that stations at rest cannot show."""
+
+
+Site = tuple[str, str | None]
+PARALLEL = 1e-6
+"""Sine of the angle between two axes up to which they are parallel; tables of rows are exact."""
+
+
+class Construction(NamedTuple):
+    """Causes, and other lists of sites that predict the same."""
+
+    causes: list[Cause]
+    alike: list[list[Site]]
+
+
+def construct(name: str, robot: Robot, span: float, rng: np.random.Generator) -> Construction:
+    """Return an ambiguous construction of its typical size."""
+    return CONSTRUCTIONS[name](robot, span, rng)
+
+
+def _at_an_end(
+    family: str, at: int, frame: str, robot: Robot, span: float, rng: np.random.Generator
+) -> Construction:
+    """Turn or raise the first or last joint; a frame turned about or moved along it is the same."""
+    cause = {**draw(family, robot, span, rng), 'joint': robot.joint_names[at]}
+    return Construction([cause], [[(frame, None)]])
+
+
+def _base_turn(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
+    """Turn the base about the first axis."""
+    base = robot.T_world_base
+    turn = 5e-4 * float(rng.choice([-1.0, 1.0])) * base[:3, 2]
+    shift = base[:3, 3] - _turned_point(base[:3, 3], turn)
+    cause = {'effect': 'base_pose', 'xyz': shift.tolist(), 'rotvec': turn.tolist()}
+    return Construction([cause], [[('joint_offset', robot.joint_names[0])]])
+
+
+def _parallel(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
+    """Lengthen a link along one of parallel axes; the neighbours shift the tool alike."""
+    axes = np.array([row.z for row in frames(robot, np.zeros(robot.n)).rows])
+    for at in rng.permutation(robot.n):
+        mates = [k for k in range(robot.n) if k != at and _linked(axes, at, k)]
+        if mates:
+            cause = {**draw('link_offset', robot, span, rng), 'joint': robot.joint_names[at]}
+            alike: list[list[Site]] = [[('link_offset', robot.joint_names[k])] for k in mates]
+            return Construction([cause], alike)
+    return construct('first axis', robot, span, rng)
+
+
+def _lag_on_every_joint(robot: Robot, span: float, rng: np.random.Generator) -> Construction:
+    """Let every joint lag alike; a clock that is late is nearly the same."""
+    causes: list[Cause] = [
+        {'effect': 'servo_lag', 'joint': joint, 'time_constant': 0.008}
+        for joint in robot.joint_names
+    ]
+    return Construction(causes, [[('time_delay', None)]])
+
+
+CONSTRUCTIONS: dict[str, Callable[..., Construction]] = {
+    'first axis': partial(_at_an_end, 'joint_offset', 0, 'base_pose'),
+    'base turn': _base_turn,
+    'parallel axes': _parallel,
+    'equal lag': _lag_on_every_joint,
+    'last axis': partial(_at_an_end, 'joint_offset', -1, 'tool_pose'),
+    'pedestal': partial(_at_an_end, 'link_offset', 0, 'base_pose'),
+}
+
+
+def _turned_point(point: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    return point + np.cross(turn, point)
+
+
+def _linked(axes: np.ndarray, a: int, b: int) -> bool:
+    """Tell whether the axes of joints a to b are parallel one after the other."""
+    run = axes[min(a, b) : max(a, b) + 1]
+    return bool(np.abs(np.cross(run, run[0])).max() < PARALLEL)
+
+
+FREEDOM = 3.0
+"""Of Student's t, after which sizes are drawn: some errors of an arm are several times as large as
+the others."""
+EXACT = frozenset({'gear_ratio'})
+"""Not everywhere: tooth numbers are exact."""
+RIPPLE = 2e-4
+"""Usual amplitude of one order of a gear's ripple [rad], as `cause_sizes` has it."""
+LOW_ORDERS = (1, 2)
+"""Of the ripple that every gear has, beside one that is drawn."""
+
+
+def small_errors(robot: Robot, rng: np.random.Generator, part: float = 1.0) -> list[Cause]:
+    """Return every small error that arms of this kind have, each drawn from a part of its spread."""
+    out = []
+    for effect in plausible_arm.directions(robot, ()):
+        if effect.of not in ('joint', 'link') or effect.traits.waves is not None:
+            continue
+        size = plausible_arm.sizes(robot, effect) * rng.standard_normal(effect.vector().size)
+        if effect.name == 'joint_compliance':
+            if robot.mass is None:
+                continue
+            size = np.abs(size)
+        out.append(effect.with_vector(part * size).to_mapping())
+    return out
+
+
+def uneven_errors(robot: Robot, rng: np.random.Generator, part: float) -> list[Cause]:
+    """
+    Return small errors everywhere, of which some are several times as large as the others.
+
+    Gears run unevenly, too, and their ratios are exact. part: of the usual spread.
+    """
+    drawn = [own for own in small_errors(robot, rng, part) if own['effect'] not in EXACT]
+    out = [scaled(own, float(np.sqrt(FREEDOM / rng.chisquare(FREEDOM)))) for own in drawn]
+    for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
+        for order in () if slides else (*LOW_ORDERS, int(rng.choice(RIPPLE_ORDERS))):
+            amplitude = RIPPLE * part * abs(float(rng.standard_t(FREEDOM)))
+            phase = float(rng.uniform(-np.pi, np.pi))
+            waves = {'order': order, 'amplitude': amplitude, 'phase': phase}
+            out.append({'effect': 'transmission_ripple', 'joint': joint, **waves})
+    return out

@@ -22,7 +22,7 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..study import engine_digest
-from . import layout, seal
+from . import seal
 
 _KIB = 1024 if sys.platform != 'darwin' else 1
 """What getrusage counts memory in [bytes]."""
@@ -48,7 +48,7 @@ def diagnose_cases(
     Raises DataError: truths lie within reach, or the directory holds no cases.
     """
     readable = _truths_readable(cases, allow_readable)
-    listed = layout.read(cases / layout.CASES)
+    listed = seal.read(cases / seal.CASES)
     tasks = [
         Task(
             diagnose_case,
@@ -58,8 +58,8 @@ def diagnose_cases(
         for entry in listed['cases']
     ]
     verdicts = [_written(out, verdict) for verdict in runner.run(tasks)]
-    layout.write(
-        out / layout.VERDICTS,
+    seal.write(
+        out / seal.VERDICTS,
         {
             'seal': listed['seal'],
             'engine': engine_digest(),
@@ -77,7 +77,7 @@ def _written(out: Path, verdict: dict[str, Any]) -> dict[str, Any]:
     """Write the diagnosis of one case; return what was said of it without that."""
     content = verdict.pop('diagnosis')
     if content is not None:
-        file = out / verdict['name'] / layout.DIAGNOSIS
+        file = out / verdict['name'] / seal.DIAGNOSIS
         write_text(file, json.dumps(content, indent=1) + '\n', overwrite=True)
     return verdict
 
@@ -119,12 +119,12 @@ def diagnose_case(place: str, digest: str, with_holdout: bool) -> dict[str, Any]
 
 def diagnosis_of(directory: Path, with_holdout: bool = True) -> Diagnosis:
     """Return the diagnosis of the case of a directory; its held-out recording judges the shrink."""
-    case = layout.read(directory / layout.CASE)
-    known = directory / layout.KNOWN if case['known'] else ''
-    twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
-    holdout = [layout.HOLDOUT] if with_holdout else []
+    case = seal.read(directory / seal.CASE)
+    known = directory / seal.KNOWN if case['known'] else ''
+    twin = build_twin(load_robot(str(directory / seal.ROBOT)), known)
+    holdout = [seal.HOLDOUT] if with_holdout else []
     train, *held_out = (
-        read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
+        read_recording(directory / use, twin.robot) for use in (seal.TRAIN, *holdout)
     )
     return diagnose(
         [train],

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.features import Features
@@ -25,8 +26,7 @@ from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..plant.outside_causes import FLANK_TORQUE
-from . import layout, seal
-from .ambiguous import CONSTRUCTIONS, construct
+from . import seal
 from .blind_cell import (
     SPANS,
     BlindCell,
@@ -37,14 +37,110 @@ from .blind_cell import (
     draw_cell,
     fitted_out,
     floor,
+    poorer,
     record,
     take,
 )
-from .cause_sizes import FAMILIES, MOVING, Cause, site
+from .cause_sizes import (
+    CONSTRUCTIONS,
+    FAMILIES,
+    MOVING,
+    Cause,
+    construct,
+    draw,
+    plausible,
+    scaled,
+    site,
+)
 from .deck import STRATA, Lot, lots
-from .displacement import rms
-from .poor_motion import poorer
-from .sizing import NotVisible, draw_causes, drawn_size, sized
+from .displacement import correlation, rms
+
+SIZINGS = 6
+"""Sizes and places drawn for one cause before another cell is drawn."""
+ALIKE = 0.95
+"""Correlation of two deviations from which they are one to whoever measures."""
+NEAR = 1.15
+"""A size is right when it is wrong by no more than this factor."""
+
+
+class NotVisible(Exception):
+    """No plausible cause of the family is as large as wanted on this motion."""
+
+
+def sized(
+    cell: BlindCell, causes: Sequence[Cause], taken: Take, wanted: float
+) -> tuple[list[Cause], Array]:
+    """
+    Return causes grown together until their deviation is so many times the noise, and the deviation.
+
+    Raises NotVisible: one would have to be implausibly large or small.
+    """
+    factor = 1.0
+    for _ in range(4):
+        grown = [scaled(cause, factor) for cause in causes]
+        off = deviation(cell, grown, taken)
+        ratio = rms(off) / cell.noise
+        if 1.0 / NEAR < ratio / wanted < NEAR:
+            break
+        factor *= wanted / max(ratio, 1e-9)
+        if not all(plausible(cell.robot, cause, factor) for cause in causes):
+            names = ', '.join(cause['effect'] for cause in causes)
+            raise NotVisible(f'{names} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
+    return grown, off
+
+
+def drawn_size(stratum: tuple[float, float], rng: np.random.Generator) -> float:
+    """Return how many times the noise a cause of a stratum of `STRATA` is to be."""
+    return float(np.exp(rng.uniform(*np.log(stratum))))
+
+
+def draw_causes(
+    cell: BlindCell,
+    families: Sequence[str],
+    strata: Sequence[int],
+    taken: Take,
+    rng: np.random.Generator,
+) -> tuple[list[Cause], list[float]]:
+    """
+    Return causes of the families, and how many times the noise each is.
+
+    Raises NotVisible: a family cannot be seen on this motion.
+    """
+    causes: list[Cause] = []
+    offs: list[Array] = []
+    for family, stratum in zip(families, strata, strict=True):
+        cause, off = _one(cell, family, STRATA[stratum], taken, offs, rng)
+        if site(cause) in map(site, causes):
+            raise NotVisible(f'{family} twice at one place')
+        causes.append(cause)
+        offs.append(off)
+    return causes, [rms(off) / cell.noise for off in offs]
+
+
+def _one(
+    cell: BlindCell,
+    family: str,
+    stratum: tuple[float, float],
+    taken: Take,
+    others: Sequence[Array],
+    rng: np.random.Generator,
+) -> tuple[Cause, Array]:
+    if taken.command.static and family in MOVING:
+        raise NotVisible(f'{family} shows in motion only')
+    span = float(taken.command.t[-1] - taken.command.t[0])
+    reason = NotVisible(family)
+    for _ in range(SIZINGS):
+        wanted = drawn_size(stratum, rng)
+        try:
+            (cause,), off = sized(cell, [draw(family, cell.robot, span, rng)], taken, wanted)
+        except NotVisible as error:
+            reason = error
+            continue
+        if all(correlation(off, other) < ALIKE for other in others):
+            return cause, off
+        reason = NotVisible(f'{family} moves the tool as another cause does')
+    raise reason
+
 
 TRIES = 30
 """
@@ -113,18 +209,18 @@ def make(
     """
     asked = {'seed': seed, 'count': count, 'kinds': list(kinds), 'seconds': list(spans)}
     _refuse_other(cases, truths, asked)
-    if (cases / layout.CASES).exists():
-        return str(layout.read(cases / layout.CASES)['seal'])
+    if (cases / seal.CASES).exists():
+        return str(seal.read(cases / seal.CASES)['seal'])
     drawn = lots(seed, count, kinds, tuple(CONSTRUCTIONS))
     truths.mkdir(parents=True, exist_ok=True)
-    layout.write(truths / layout.TRUTHS, asked, overwrite=True)
+    seal.write(truths / seal.TRUTHS, asked, overwrite=True)
     tasks = [
         Task(make_case, (seed, k, lot, str(cases), str(truths), spans), f'case {k + 1}')
         for k, lot in enumerate(drawn)
     ]
     entries = runner.run(tasks)
     sealed = seal.seal_of(entries)
-    layout.write(cases / layout.CASES, {'seal': sealed, 'cases': entries}, overwrite=True)
+    seal.write(cases / seal.CASES, {'seal': sealed, 'cases': entries}, overwrite=True)
     seal.make_private(truths)
     return sealed
 
@@ -133,14 +229,14 @@ def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
     """Refuse to mix these cases with others."""
     if cases.resolve() == truths.resolve():
         raise DataError('cases and truths must go to different directories')
-    if (truths / layout.TRUTHS).exists():
-        existing = layout.read(truths / layout.TRUTHS)
+    if (truths / seal.TRUTHS).exists():
+        existing = seal.read(truths / seal.TRUTHS)
         if any(existing.get(key) != value for key, value in asked.items()):
             raise DataError(
                 f"'{truths}' holds the truths of other cases, of seed {existing['seed']}; choose "
                 'another place'
             )
-    elif (cases / layout.CASES).exists():
+    elif (cases / seal.CASES).exists():
         raise DataError(f"'{cases}' holds cases already; choose another place")
 
 
@@ -158,9 +254,9 @@ def make_case(
 
 
 def _written(case: SealedCase, name: str, cases: Path, truths: Path) -> dict[str, str]:
-    with new_directory(cases / name, mark=layout.CASE) as place:
+    with new_directory(cases / name, mark=seal.CASE) as place:
         write_case(place, name, case)
-    with new_directory(truths / name, mark=layout.TRUTH) as place:
+    with new_directory(truths / name, mark=seal.TRUTH) as place:
         write_truth(place, name, case)
     return {'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)}
 
@@ -270,14 +366,14 @@ def one_arm(case: SealedCase) -> SealedCase:
 def write_case(place: Path, name: str, case: SealedCase) -> None:
     """Write what whoever diagnoses may see."""
     cell = case.cell
-    write_robot_yaml(place / layout.ROBOT, cell.robot)
+    write_robot_yaml(place / seal.ROBOT, cell.robot)
     if cell.known:
-        write_text(place / layout.KNOWN, yaml_text([dict(item) for item in cell.known]))
-    for use, taken in ((layout.TRAIN, case.train), (layout.HOLDOUT, case.holdout)):
+        write_text(place / seal.KNOWN, yaml_text([dict(item) for item in cell.known]))
+    for use, taken in ((seal.TRAIN, case.train), (seal.HOLDOUT, case.holdout)):
         made = as_recording(use, record(cell, case.causes, taken))
         write_recording(place / use, made, cell.robot)
-    layout.write(
-        place / layout.CASE,
+    seal.write(
+        place / seal.CASE,
         {
             'name': name,
             'align': list(cell.align),
@@ -291,8 +387,8 @@ def write_truth(place: Path, name: str, case: SealedCase) -> None:
     """Write what is sealed: the causes, and the recording that no diagnosis sees."""
     cell = case.cell
     tested = record(cell, case.causes, case.test)
-    write_recording(place / layout.TEST, as_recording(layout.TEST, tested), cell.robot)
-    layout.write(place / layout.TRUTH, {'salt': secrets.token_hex(16), **truth_of(name, case)})
+    write_recording(place / seal.TEST, as_recording(seal.TEST, tested), cell.robot)
+    seal.write(place / seal.TRUTH, {'salt': secrets.token_hex(16), **truth_of(name, case)})
 
 
 def truth_of(name: str, case: SealedCase) -> dict[str, Any]:

@@ -17,8 +17,45 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
+from weld_twin_msgs_py.files.whole_files import read_json, write_json
 
-from . import layout
+CASES = 'cases.json'
+CASE = 'case.json'
+ROBOT = 'robot.yaml'
+KNOWN = 'known.yaml'
+TRAIN, HOLDOUT, TEST = 'train', 'holdout', 'test'
+TRUTHS = 'truths.json'
+TRUTH = 'truth.json'
+VERDICTS = 'verdicts.json'
+DIAGNOSIS = 'diagnosis.json'
+SCORE = 'score.json'
+
+SCHEMAS = {
+    CASES: 'weld_twin/blind/cases/1',
+    CASE: 'weld_twin/blind/case/1',
+    TRUTHS: 'weld_twin/blind/truths/1',
+    TRUTH: 'weld_twin/blind/truth/1',
+    VERDICTS: 'weld_twin/blind/verdicts/1',
+    SCORE: 'weld_twin/blind/score/1',
+}
+
+
+def read(path: Path) -> dict[str, Any]:
+    """
+    Return the content of one of the JSON files above.
+
+    Raises DataError: it cannot be read or is something else.
+    """
+    data, wanted = read_json(path), SCHEMAS[path.name]
+    if data.get('schema') != wanted:
+        raise DataError(f"'{path}' has the schema {data.get('schema')!r}, expected {wanted}")
+    return data
+
+
+def write(path: Path, content: dict[str, Any], *, overwrite: bool = False) -> None:
+    """Write one of the JSON files above."""
+    write_json(path, {'schema': SCHEMAS[path.name], **content}, overwrite=overwrite)
+
 
 PRIVATE_DIRECTORY, PRIVATE_FILE = 0o700, 0o600
 """Permissions by which nobody but the owner can look."""
@@ -51,7 +88,7 @@ def make_private(path: Path) -> None:
 def truths_within_reach(cases: Path) -> Path | None:
     """Return a directory of truths inside or beside the cases that can be read, or None."""
     for place in _near(cases.resolve()):
-        if (place / layout.TRUTHS).is_file() and os.access(place / layout.TRUTHS, os.R_OK):
+        if (place / TRUTHS).is_file() and os.access(place / TRUTHS, os.R_OK):
             return place
     return None
 
@@ -73,11 +110,11 @@ def opened(cases: Path, truths: Path, seal: str = '') -> list[dict[str, Any]]:
 
     Raises DataError: a case or a truth is not what it was when the seal was made.
     """
-    listed = layout.read(cases / layout.CASES)
+    listed = read(cases / CASES)
     entries = listed['cases']
     if seal_of(entries) != (seal or listed['seal']) or listed['seal'] != seal_of(entries):
         raise DataError(
-            f"the seal of '{cases / layout.CASES}' is broken: its list of cases was changed, or "
+            f"the seal of '{cases / CASES}' is broken: its list of cases was changed, or "
             'it is not the list whose seal was given'
         )
     return [_one(cases, truths, entry) for entry in entries]
@@ -90,4 +127,4 @@ def _one(cases: Path, truths: Path, entry: Mapping[str, Any]) -> dict[str, Any]:
             raise DataError(f"the {key} of {name} is missing: there is no '{place}'")
         if digest(place) != entry[key]:
             raise DataError(f"the {key} of {name} was changed after it was sealed; see '{place}'")
-    return layout.read(truths / name / layout.TRUTH)
+    return read(truths / name / TRUTH)

@@ -3,16 +3,13 @@
 """
 Long trials of robustness whose results are kept under version control.
 
-Each module of this package is a campaign; what a campaign needs beside it lies in a sub-package.
-A campaign has a docstring, whose first line is the help text, and::
+A campaign is a row of the table in `cli/lab.py`, and a module of its name with::
 
-    OPTIONS = options(..., out='')
-    def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]: ...
+    def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]: ...
     def table(result: dict[str, Any]) -> str: ...
 
 `run` returns plain JSON values, among them ``passed`` (bool); `tell` prints a line of progress.
 `table` says the result at a glance, in Markdown; docs/robustness.md shows those of the kept ones.
-Modules import what is slow to import (numpy, rclpy) inside `run`.
 """
 
 from __future__ import annotations
@@ -20,22 +17,33 @@ from __future__ import annotations
 import json
 import os
 import platform
+import time
 from collections.abc import Mapping
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import read_json, write_text
 
+from ..study import Study
+
 SCHEMA = 'weld_twin/campaign/1'
 
 
-def names() -> list[str]:
-    """Return the campaigns there are."""
-    return sorted(module.name for module in iter_modules(__path__) if not module.ispkg)
+def run(study: Study) -> bool:
+    """Run the campaign, write its result, and say whether it passed."""
+    args, name = study.args, str(study.args.job)
+    refuse_foreign(args.out, name)
+    module = import_module(f'{__name__}.{name}')
+    begin = time.monotonic()
+    result: dict[str, Any] = module.run(args, lambda line: print(line, flush=True))
+    write_result(args.out, name, time.monotonic() - begin, result)
+    print(module.table(result))
+    print(f'{name}: {"passed" if result["passed"] else "FAILED"}, {args.out}')
+    return bool(result['passed'])
 
 
 def write_result(

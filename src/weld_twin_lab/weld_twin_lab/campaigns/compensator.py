@@ -1,30 +1,90 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Send drawn goals through a compensator in a cell, and change the cell under it.
-
-A diagnosis learns each of six arms with sure causes. Goals run as they are and through the compensator.
-Then a clock jumps, the load changes, the model is a wrong one, the tracker is lost.
-"""
+"""Drawn goals go through a compensator in a cell, and as many without nodes."""
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from weld_twin_core.errors import DataError
+import numpy as np
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
+from weld_twin_core.twin.goal_motion import Goal, course, fine_times
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_core.twin.reversals import approached
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import read_json
+from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.offline.correcting import program_model
 
-from ..study import options, tabled
+from ..study import tabled
 from . import write_result
-from .compensating import NOTHING
+from .drawn_cells import (
+    CHANGES,
+    NOTHING,
+    Arm,
+    Known,
+    arms_of,
+    cell_of,
+    drawn_goal,
+    learned,
+    right_and_wrong,
+    true_effects,
+)
+from .message_packages import messages_importable
 
-if TYPE_CHECKING:
-    from .compensating.drawn_cells import Arm
-    from .compensating.trial import Known
+LIMITS = GoalLimits(acceleration=20.0)
+"""As a compensator has them that is told nothing else."""
+
+
+def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
+    """Return what becomes of the goals of one arm that stands where each of them begins."""
+    robot, causes, rng = cell_of(name, seed)
+    with TemporaryDirectory() as place:
+        file = Path(place) / 'diagnosis.json'
+        file.write_text(learned(robot, causes, rng).text)
+        try:
+            model = program_model(robot, file)
+        except TwinError:  # a compensator does not take it either
+            return []
+    true = ProgramModel(robot, true_effects(robot, causes))
+    rows = []
+    for _ in range(goals):
+        goal, inside = drawn_goal(robot, rng)
+        start = Start(goal.q[0], False, rng.choice([-1.0, 1.0], robot.n))
+        corrected, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
+        before, _ = _off(true, goal, goal, start)
+        row = {'robot': name, 'arm': seed, 'after': '', 'inside': inside, 'before_m': before}
+        row['best_m'] = before if isinstance(best, Refusal) else best.after
+        if isinstance(corrected, Refusal):
+            row |= {'verdict': 'refused', 'after_m': before, 'bound_m': None}
+        else:
+            after, worst = _off(true, corrected.goal.later(-corrected.waits), goal, start)
+            row |= {'verdict': 'corrected', 'after_m': after, 'worst_m': worst}
+            row |= {'bound_m': corrected.bound}
+        rows.append(row)
+    return rows
+
+
+def _off(true: ProgramModel, run: Goal, goal: Goal, start: Start) -> tuple[float, float]:
+    """Return how far the arm with the true causes is from where a goal means it, RMS and most [m]."""
+    at: Array = fine_times(goal)
+    way = Recording('goal', JointMotion(at, course(run, at).q))
+    came = approached(way, start.came, start.q)
+    real = Twin(true.robot, true.effects).poses(came).position[-at.size :]
+    apart = real - forward(true.robot, course(goal, at).q)[:, :3, 3]
+    squares = (apart**2).sum(axis=1)
+    return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
+
 
 WORSE = (2e-5, 0.05)
 """A goal is worse if it is farther off than before by more than this [m], and by this share."""
@@ -45,26 +105,11 @@ LARGEST = ('worst_m', 'bound_m')
 """Its largest distance when it is corrected [m], and what was told of that."""
 
 
-OPTIONS = options(
-    """
---goals N         goals of all arms [default: 500]
---without-cell N  goals of all arms that are judged without nodes, 0 for none [default: 500]
---seed N          decides what is drawn [default: 7]
---go-on           keep the goals and changes that the file has, and try the others
-""",
-    out='',
-)
-
-
-def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change."""
-    from .building.message_packages import messages_importable
-
     begun = time.monotonic()
     with messages_importable():
-        from .compensating.drawn_cells import arms_of, right_and_wrong
-        from .compensating.trial import other_arm, tried
-        from .compensating.without_cell import judged
+        from .compensator_trial import other_arm, tried
 
         known = _before(args)
 
@@ -87,7 +132,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     return _made(args, known, other)
 
 
-def _made(args: argparse.Namespace, known: Known, other: str) -> dict[str, Any]:
+def _made(args: Given, known: Known, other: str) -> dict[str, Any]:
     """Return what goes into the file."""
     results = summary(known.rows, known.changes, other, known.without)
     return {**results, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
@@ -95,9 +140,6 @@ def _made(args: argparse.Namespace, known: Known, other: str) -> dict[str, Any]:
 
 def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
     """Return the arms that lack a change, or some of their goals."""
-    from .compensating.drawn_cells import arms_of
-    from .compensating.trial import CHANGES
-
     changed = {change['robot'] for change in known.changes if change['change'] == CHANGES[-1]}
     return [
         arm
@@ -107,10 +149,8 @@ def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
     ]
 
 
-def _before(args: argparse.Namespace) -> Known:
+def _before(args: Given) -> Known:
     """Return the goals and changes of the file, none where there is no file yet."""
-    from .compensating.trial import Known
-
     file = Path(args.out)
     if not args.go_on or not file.exists():
         return Known([], [], [])
@@ -159,8 +199,6 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return what goals come to."""
-    import numpy as np
-
     done = [row for row in rows if row['verdict'] == 'corrected']
     bound = [row for row in done if row['bound_m'] is not None]
     to_do = [row for row in rows if worth(row)]

@@ -1,45 +1,24 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Read broken files of every kind.
-
-Samples that are right are changed at random, as bytes, as text and as trees, and read. A file must
-give a result or one clear sentence: never a traceback, a hang or a gigabyte. With --recordings,
-recordings that hardly say anything are diagnosed, too: one axis to nine, one station to sixty, joints
-that stand still, exact zeros, repeats, shuffled rows.
-"""
+"""Broken files of every kind are read, and recordings that hardly say anything diagnosed."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
+from weld_twin_nodes.cli.given import Given
 
-from ..study import options
-
-OPTIONS = options(
-    """
---cases N       broken files of each kind [default: 5000]
---seed N        decides how they are broken [default: 1]
---only LIST     kinds, comma-separated
---recordings N  recordings that hardly say anything, from --seed on [default: 0]
-""",
-    out='',
-)
+from .broken_files import targets
+from .hunt import CPU_LIMIT, MEMORY_LIMIT, Finding, hunt, try_all
+from .poor_recordings import worst_of
 
 
-def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what every kind of file came to."""
-    from dataclasses import asdict
-
-    from weld_twin_core.errors import DataError
-
-    from .fuzzing.hunt import CPU_LIMIT, MEMORY_LIMIT, Finding, hunt
-    from .fuzzing.malicious import try_all
-    from .fuzzing.recordings import worst_of
-    from .fuzzing.targets import targets
-
     names = list(targets())
     chosen = [name for name in args.only.split(',') if name] or names
     if unknown := set(chosen) - set(names):

@@ -1,25 +1,256 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Joint state in to twin pose out, beside a bare relay that copies the message.
-
-Relay and twin take turns of a second on one machine in one run, so that the ratios hold on a busy
-machine too. One twin takes its base from `/tf` and goes on listening to an arm's frames there.
-Times are from the call that sends the joint state to the call that receives the answer. A second
-part lets the twin answer with and without a live diagnosis under way. A third lets a compensator
-answer to poses, beside a relay that copies those.
-"""
+"""Contenders in processes of their own take turns at one beat; their latency and CPU time."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from copy import copy
+from pathlib import Path
+from struct import unpack_from
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.messages.cdr_read import HEADER
+from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, POSE_OUT, TWIN_POSE
+from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.harness.process import own_domain
+from weld_twin_nodes.live.diagnosis_worker import Job, Worker
+from weld_twin_nodes.live.run_node import executor
 
-from ..study import options
+from . import partners
+from .message_packages import messages_importable
+from .partners import BEAT, HOME, ROBOT
+from .soak import cpu_ns
 
+SETTLE = 0.15
+"""Seconds to wait for what is still under way after a turn."""
+
+
+USUAL = {JOINT_STATES.name: 'given', TWIN_POSE.name: 'answer'}
+"""Where contenders are asked and answer."""
+
+
+class Contender:
+    """A process that answers; its latency [ns], turn by turn, and its CPU time."""
+
+    def __init__(
+        self,
+        name: str,
+        words: Sequence[str],
+        kind: Any,
+        parameters: Sequence[str],
+        remaps: Mapping[str, str] = USUAL,
+    ) -> None:
+        self.name, self.kind = name, kind
+        self.given, self.answer = f'/race/{name}/in', f'/race/{name}/out'
+        ends = {'given': self.given, 'answer': self.answer}
+        self._command = [
+            sys.executable,
+            '-m',
+            *words,
+            '--ros-args',
+            *parameters,
+            *(w for old, new in remaps.items() for w in ('-r', f'{old}:={ends.get(new, new)}')),
+            '-r',
+            f'__node:={name}',
+        ]
+        self.turns: list[list[int]] = []
+        self.cpu = self.sent = 0
+
+    def start(self) -> subprocess.Popen[bytes]:
+        """Start the process."""
+        self.process = subprocess.Popen(self._command, stderr=subprocess.DEVNULL)
+        return self.process
+
+    def hear(self, data: bytes) -> None:
+        """Take an answer, whose stamp is when the question was sent."""
+        now = time.monotonic_ns()
+        if not self.turns:  # late, of a turn that does not count
+            return
+        sec, nanosec = unpack_from('<iI', data, HEADER)
+        self.turns[-1].append(now - sec * 1_000_000_000 - nanosec)
+
+    def result(self) -> dict[str, float]:
+        """
+        Return percentiles [us], the CPU time of one message [us] and what was lost.
+
+        ``p50_us`` and ``p99_us`` are the medians of the turns' own percentiles, so that a turn
+        which somebody else's work disturbed does not decide; ``p99_all_us`` is of all samples.
+        """
+        turns = [np.percentile(turn, [50, 99]) / 1e3 for turn in self.turns if turn]
+        p50, p99 = np.median(turns, axis=0)
+        pooled = np.concatenate(self.turns)
+        return {
+            'p50_us': round(float(p50), 1),
+            'p99_us': round(float(p99), 1),
+            'p99_all_us': round(float(np.percentile(pooled, 99)) / 1e3, 1),
+            'cpu_us': round(self.cpu / self.sent / 1e3, 1),
+            'sent': self.sent,
+            'lost': self.sent - pooled.size,
+        }
+
+    def add(self, other: Contender) -> None:
+        """Take over the samples of another."""
+        self.turns += other.turns
+        self.cpu += other.cpu
+        self.sent += other.sent
+
+    def clear(self) -> None:
+        """Forget the samples."""
+        self.turns = []
+        self.cpu = self.sent = 0
+
+
+class Race:
+    """A context manager in which contenders answer."""
+
+    def __init__(self, contenders: Sequence[Contender], *, poses: bool = False) -> None:
+        self.contenders = contenders
+        self._poses = poses
+        self.meanwhile: Callable[[], None] = lambda: None
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Race:
+        """Start the contenders and what feeds them."""
+        self._stack.enter_context(messages_importable())
+        self._stack.enter_context(own_domain())
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._stack.callback(rclpy.try_shutdown)
+        self._runner = executor()
+        node = self.node = Node('finish')
+        self._runner.add_node(node)
+        deep = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
+        for contender in self.contenders:
+            process = contender.start()
+            self._stack.callback(process.wait)
+            self._stack.callback(process.terminate)
+            node.create_subscription(
+                contender.kind, contender.answer, contender.hear, deep, raw=True
+            )
+        self._helper('frames', None)
+        self._pulse = self._helper('pulse', subprocess.PIPE)
+        return self
+
+    def _helper(self, name: str, out: int | None) -> subprocess.Popen[str]:
+        """Return one of the partners that runs until its standard input is closed."""
+        words = [sys.executable, '-m', partners.__name__, name]
+        process = subprocess.Popen(words, text=True, stdin=subprocess.PIPE, stdout=out, bufsize=1)
+        assert process.stdin is not None
+        self._stack.callback(process.wait)
+        self._stack.callback(process.stdin.close)
+        return process
+
+    def __exit__(self, *_: object) -> None:
+        """End all processes."""
+        self._stack.close()
+
+    def turn(self, contender: Contender, rate: float, seconds: float) -> None:
+        """Let one contender answer for some time."""
+        assert self._pulse.stdin is not None
+        assert self._pulse.stdout is not None
+        count = max(round(rate * seconds), 1)
+        contender.turns.append([])
+        before = cpu_ns(contender.process.pid)
+        self._pulse.stdin.write(f'{contender.given} {rate} {count} {int(self._poses)}\n')
+        future: Future = Future()
+        done = self._pulse.stdout.readline
+        threading.Thread(target=lambda: future.set_result(done())).start()
+        while not future.done():
+            self.meanwhile()
+            self._runner.spin_until_future_complete(future, timeout_sec=0.05)
+        end = time.monotonic() + SETTLE
+        while time.monotonic() < end:
+            self._runner.spin_until_future_complete(Future(), timeout_sec=SETTLE / 5)
+        contender.cpu += cpu_ns(contender.process.pid) - before
+        contender.sent += count
+
+
+ARM = '/race/arm'
+"""Where the arm's joint states are told."""
+CAUSES = (
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4e-4},
+    {'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': 4e-4},
+    {
+        'effect': 'transmission_ripple',
+        'joint': 'shoulder_pan_joint',
+        'amplitude': 2e-4,
+        'order': 2.0,
+        'phase': 0.3,
+    },
+    {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 4e-6},
+)
+"""What the model holds: constants, a gear's error and a spring."""
+SECONDS = BEAT
+"""Length of a turn [s]: there and back, so that the next one begins where this one ended."""
+
+
+def pose_race(turns: int, rate: float, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return the latency of each contender [us], the ratios, and what was lost."""
+    with TemporaryDirectory() as place:
+        model = Path(place) / 'effects.yaml'
+        model.write_text(yaml_text(list(CAUSES)))
+        kind = POSE_OUT.message_class()
+        relay = Contender('relay', RELAY, kind, ('-p', 'poses:=true'))
+        own = Contender(
+            'compensator',
+            ('weld_twin_nodes.live.compensator',),
+            kind,
+            _words(f'robot:={ROBOT}', f'model:={model}', 'apply:=true', 'managed:=false'),
+            {'~/pose_in': 'given', '~/pose_out': 'answer', JOINT_STATES.name: ARM},
+        )
+        with Race((relay, own), poses=True) as both:
+            both.meanwhile = _arm(both)
+            for contender in (own, relay, own):
+                both.turn(contender, rate, SECONDS)
+            for contender in (own, relay):
+                contender.clear()
+            for k in range(turns):
+                for contender in (own, relay) if k % 2 else (relay, own):
+                    both.turn(contender, rate, SECONDS)
+    out = {each.name: each.result() for each in (relay, own)}
+    for name, row in out.items():
+        tell(f'{rate:.0f} poses/s  {name:12} {row}')
+    ratio = {
+        key: round(out['compensator'][key] / out['relay'][key], 3) for key in ('p50_us', 'p99_us')
+    }
+    tell(f'compensator / relay {ratio}')
+    return {**out, 'rate_hz': rate, 'ratio': ratio, 'lost': out['compensator']['lost']}
+
+
+def _words(*settings: str) -> tuple[str, ...]:
+    return tuple(word for setting in settings for word in ('-p', setting))
+
+
+def _arm(both: Race) -> Callable[[], None]:
+    """Return what tells, again and again, where the arm stands."""
+    encode = JointStateEncoder(catalog.load(ROBOT).joint_names)
+    publisher = both.node.create_publisher(
+        JOINT_STATES.message_class(), ARM, JOINT_STATES.offered.to_rclpy()
+    )
+    clock = both.node.get_clock()
+    return lambda: publisher.publish(encode(clock.now().nanoseconds, HOME))
+
+
+RELAY = (partners.__name__, 'relay')
 RATES = (125.0, 500.0, 1000.0)
 """Rates [Hz] of joint states: common controllers, and twice the fastest of them."""
 LIMIT = 1.25
@@ -28,7 +259,7 @@ WANTED = {'twin': 1.10, 'compensator': 1.5}
 """Ratios of p50 and p99 to the relay that are wanted of each."""
 POSES = 500.0
 """Poses a second for the compensator."""
-TWIN = 'weld_twin_nodes.live.forward_kinematics_twin'
+TWIN = ('weld_twin_nodes.live.forward_kinematics_twin',)
 ON_TF = tuple(
     word
     for setting in ('measuring_frame:=world', 'base_frame:=base_link', 'base_from_tf:=true')
@@ -50,28 +281,13 @@ processor time that the relay has no like of, so that only the latency counts th
 """
 
 
-OPTIONS = options(
-    """
---turns N    turns of each, at each rate [default: 20]
---seconds S  length of a turn [default: 1]
-""",
-    out='',
-)
-
-
-def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return latency and CPU time of each contender at each rate, and the ratios."""
-    from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
-
-    from .compensating.pose_race import race as pose_race
-    from .live.latency_race import Contender, Race
-
-    relay = f'{__package__}.live.relay'
     joints, pose = JOINT_STATES.message_class(), TWIN_POSE.message_class()
     contenders = (
-        Contender('relay', relay, joints, ()),
-        Contender('raw_relay', relay, joints, ('-p', 'raw:=true')),
-        Contender('bare', relay, pose, ('-p', 'bare:=true')),
+        Contender('relay', RELAY, joints, ()),
+        Contender('raw_relay', RELAY, joints, ('-p', 'raw:=true')),
+        Contender('bare', RELAY, pose, ('-p', 'bare:=true')),
         Contender('twin', TWIN, pose, ()),
         Contender('twin_tf', TWIN, pose, ON_TF),
     )
@@ -100,9 +316,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     }
 
 
-def _at(
-    race: Any, rate: float, args: argparse.Namespace, tell: Callable[[str], None]
-) -> dict[str, Any]:
+def _at(race: Any, rate: float, args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     for contender in race.contenders:
         contender.clear()
     for k in range(args.turns):
@@ -119,11 +333,9 @@ def _at(
 
 
 def _beside_diagnosis(
-    race: Any, twin: Any, args: argparse.Namespace, tell: Callable[[str], None]
+    race: Any, twin: Any, args: Given, tell: Callable[[str], None]
 ) -> dict[str, Any]:
     """Return the twin's figures at 500 Hz with and without a diagnosis in its own process."""
-    from weld_twin_nodes.live.diagnosis_worker import Worker
-
     job, worker = _job(), Worker()
     samples: dict[str, dict[str, float]] = {}
     both = {'alone': copy(twin), 'beside': copy(twin)}
@@ -143,15 +355,8 @@ def _beside_diagnosis(
     return samples
 
 
-def _job() -> Any:
+def _job() -> Job:
     """Return a diagnosis of a minute of a cell, which takes longer than a turn."""
-    import numpy as np
-
-    from weld_twin_core.arm import catalog
-    from weld_twin_core.recording import JointMotion, Measurements, Recording
-    from weld_twin_core.twin.twin import Twin
-    from weld_twin_nodes.live.diagnosis_worker import Job
-
     robot = catalog.load('ur5')
     t = np.arange(0.0, 60.0, 0.002)
     q = 0.5 * np.sin(np.outer(t, 0.9 + 0.3 * np.arange(6)))

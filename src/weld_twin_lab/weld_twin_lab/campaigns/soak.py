@@ -1,20 +1,239 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""All nodes together for a long time: memory, lost samples, CPU time.
-
-The generator goes along a seam there and back in real time; injector, twin, analyzer, markers,
-recorder and live diagnosis work on what it sends.
-"""
+"""All nodes together for a long time; what their processes, health topic and bag tell."""
 
 from __future__ import annotations
 
-import argparse
+import os
+import time
+from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.errors import TwinError
+from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.files import markdown
+from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.cell import HealthListener
+from weld_twin_nodes.offline.seam_motion import plan_motion
 
-from ..study import options
+PROC = Path('/proc')
+PAGE = os.sysconf('SC_PAGE_SIZE')
+
+
+def cpu_ns(pid: int) -> int:
+    """Return the time a process has been on a CPU, all threads that live [ns]."""
+    total = 0
+    for task in (PROC / str(pid) / 'task').iterdir():
+        with suppress(OSError):  # the thread has ended
+            total += int((task / 'schedstat').read_text().split()[0])
+    return total
+
+
+def rss_bytes(pid: int) -> int:
+    """Return the memory of a process that is resident [bytes]."""
+    return int((PROC / str(pid) / 'statm').read_text().split()[1]) * PAGE
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes a process has started and that still run."""
+    out: list[int] = []
+    for task in (PROC / str(pid) / 'task').iterdir():
+        with suppress(OSError):
+            out += map(int, (task / 'children').read_text().split())
+    return out
+
+
+MIB = 2.0**20
+"""Bytes."""
+ROBOT, PATH = 'ur5', 'polyline'
+BEGUN = '/recorder: /deviation'
+"""Status of the last node's input, which brings something once the cell works."""
+COMPLETE = 300.0
+"""Seconds the recorder has to complete its bag."""
+SPLIT = 300.0
+"""Seconds a file of the bag spans."""
+EACH = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
+"""Topics with one message for each joint state."""
+COUNTED = (*EACH, '/deviation')
+"""Inputs of which a node should have had as many messages as joint states were sent."""
+
+
+class Usage(NamedTuple):
+    """Time since the start [s], resident memory [bytes] and time on a CPU [ns] of a process."""
+
+    t: float
+    rss: int
+    cpu: int
+
+
+class Soak:
+    """A context manager with all nodes of a cell in processes of their own."""
+
+    def __init__(self, folder: Path, bag: Path, rate: float, seconds: float, effects: str) -> None:
+        self._cell = Cell(folder)
+        self._bag, self._rate, self._effects = bag, rate, effects
+        samples = plan_motion(catalog.load(ROBOT), PATH, rate=rate).motion.t.size
+        self._rounds = max(round(seconds * rate / samples), 1)
+        self.sent = self._rounds * samples
+        self.samples: dict[str, list[Usage]] = defaultdict(list)
+        self._work: dict[int, Usage] = {}
+
+    def __enter__(self) -> Soak:
+        """Start the nodes."""
+        self._cell.__enter__()
+        try:
+            self._start()
+        except BaseException:
+            self._cell.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the nodes."""
+        self._cell.__exit__()
+
+    def finish(self) -> None:
+        """Let the recorder complete its bag, which takes it some time."""
+        recorder = self._cell.processes[0]
+        recorder.interrupt()
+        recorder.end(COMPLETE)
+
+    def _start(self) -> None:
+        cell, sure = self._cell, {'reliable_inputs': True}
+        self._listener = HealthListener(cell.node)
+        cell.start('recorder', out=str(self._bag), split_duration=SPLIT, **sure)
+        cell.start('live_diagnosis', **sure)
+        cell.start('deviation_markers', **sure)
+        cell.start('deviation_analyzer', wait_for_subscribers=1, **sure)
+        cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
+        cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=2, **sure)
+        cell.start(
+            'trajectory_generator',
+            rate=self._rate,
+            repeat=self._rounds,
+            path=PATH,
+            robot=ROBOT,
+            wait_for_subscribers=4,
+            **sure,
+        )
+        node = cell.node
+        cell.wait(lambda: node.count_publishers('/diagnostics') == len(cell.processes), 'all')
+
+    def run(self, every: float, tell: Callable[[str], None]) -> None:
+        """Let the cell work to the end of the motion; look at its processes now and then."""
+        heard = self._listener.values
+        self._cell.wait(lambda: int(heard.get(BEGUN, {}).get('received', 0)) > 0, 'the motion')
+        begin = time.monotonic()
+        self._listener.clear()
+        due = every
+        while due <= self.sent / self._rate:
+            end = begin + due
+            self._cell.wait(lambda: time.monotonic() >= end, 'the next look', every + 60.0)  # noqa: B023
+            self._look(time.monotonic() - begin)
+            if round(due / every) % 12 == 0:
+                tell(self._line(due))
+            due += every
+        self._reported = {name: list(entries) for name, entries in self._listener.told.items()}
+        end = time.monotonic() + COMPLETE
+        self._cell.wait(
+            lambda: self._least() >= self.sent or time.monotonic() > end,
+            'the rest',
+            2.0 * COMPLETE,
+        )
+        quiet = time.monotonic() + 3.0
+        self._cell.wait(lambda: time.monotonic() > quiet, 'the last word on health')
+
+    def _least(self) -> int:
+        """Return how many messages came through where fewest did."""
+        return min(
+            int(values['received'])
+            for name, values in self._listener.values.items()
+            if name.partition(': ')[2] in COUNTED
+        )
+
+    def _look(self, t: float) -> None:
+        for process in self._cell.processes:
+            usage = Usage(t, rss_bytes(process.pid), cpu_ns(process.pid))
+            self.samples[process.name].append(usage)
+            for child in children(process.pid):
+                with suppress(OSError):  # it has just ended
+                    self._work[child] = Usage(t, rss_bytes(child), cpu_ns(child))
+
+    def _line(self, t: float) -> str:
+        now = ' '.join(f'{name}:{s[-1].rss / MIB:.0f}' for name, s in self.samples.items())
+        return f'{t / 60.0:5.1f} min, MiB {now}'
+
+    def usage(self, warm: float) -> dict[str, dict[str, float]]:
+        """Return CPU share, memory and its slope of each node, and of the diagnosis's workers."""
+        out = {}
+        for name, samples in self.samples.items():
+            t, rss, cpu = np.array(samples, dtype=np.float64).T
+            late = t > warm * t[-1]
+            slope = np.polyfit(t[late], rss[late], 1)[0] if late.sum() > 2 else 0.0
+            out[name] = {
+                'cpu_share': round(float((cpu[-1] - cpu[0]) / (t[-1] - t[0])) * 1e-9, 4),
+                'rss_mib': round(float(rss[-1]) / MIB, 1),
+                'rss_first_mib': round(float(rss[late][0]) / MIB, 1),
+                'rss_slope_mib_per_h': round(float(slope) * 3600.0 / MIB, 2),
+            }
+        spent = sum(usage.cpu for usage in self._work.values())
+        span = next(iter(self.samples.values()))[-1].t
+        out['live_diagnosis workers'] = {
+            'cpu_share': round(spent * 1e-9 / span, 4),
+            'runs': len(self._work),
+            'rss_mib': round(max((u.rss for u in self._work.values()), default=0) / MIB, 1),
+            'rss_slope_mib_per_h': 0.0,
+        }
+        return out
+
+    def health(self) -> dict[str, Any]:
+        """Return received, refused and missing of each input, and what was told but ok."""
+        out: dict[str, Any] = {}
+        for name, values in sorted(self._listener.values.items()):
+            reported = [entry for entry in self._reported.get(name, []) if entry[0] != 'ok']
+            row: dict[str, int] = {
+                key: int(values[key]) for key in ('received', 'refused') if key in values
+            }
+            if name.partition(': ')[2] in COUNTED:
+                row['missing'] = self.sent - row['received']
+            out[name] = {
+                **row,
+                'not_ok': len(reported),
+                'worst': sorted({text for _, text in reported})[:5],
+            }
+        return out
+
+
+def losses(bag: Path, sent: int) -> dict[str, Any]:
+    """Return how many messages of each topic the bag holds and lacks of those that were sent."""
+    try:
+        with BagReader(bag) as reader:
+            counts = {topic: count for topic, (_, count) in reader.topics.items()}
+    except TwinError as error:
+        return {'reason': str(error)}
+    return {
+        topic: {'messages': count, **({'missing': sent - count} if topic in EACH else {})}
+        for topic, count in counts.items()
+    }
+
+
+def verdict(result: dict[str, Any], flat: float) -> bool:
+    """Tell whether no node lost or refused anything and every node's memory is flat."""
+    inputs = result['health'].values()
+    return (
+        all(result['recorded'].get(topic, {}).get('missing') == 0 for topic in EACH)
+        and all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
+        and all(row.get('refused', 0) == row.get('missing', 0) == 0 for row in inputs)
+    )
+
 
 EVERY = 5.0
 """Seconds between two looks at the processes."""
@@ -29,26 +248,10 @@ EFFECTS = """
 """
 
 
-OPTIONS = options(
-    """
---minutes M  length of the trial [default: 30]
---rate HZ    joint states a second [default: 500]
---cores N    cores all nodes share [default: 2]
-""",
-    out='',
-)
-
-
-def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return memory, CPU share and losses of every node."""
-    import os
-    import tempfile
-    from pathlib import Path
-
-    from .live.soaking import Soak, losses, verdict
-
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: args.cores])
-    with tempfile.TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
         with Soak(Path(folder) / 'cell', bag, args.rate, args.minutes * 60.0, EFFECTS) as soak:
             soak.run(EVERY, tell)

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 from pathlib import Path
 
+from .entrants import entrant
 from .open_form import read_case, write_answer
 
 name, case, out = sys.argv[1:]
-entrant = import_module(f'{__package__}.entrants.{name}')
-write_answer(Path(out), entrant.answer(read_case(Path(case))))
+write_answer(Path(out), entrant(name)(read_case(Path(case))))

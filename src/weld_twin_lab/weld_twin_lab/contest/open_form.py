@@ -27,7 +27,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording, Signa
 from weld_twin_msgs_py.files.whole_files import write_json
 from weld_twin_msgs_py.robots import load_robot
 
-from ..blind.achieved import measured_of
+from ..blind.displacement import measured_of
 
 ANSWER, PREDICTED = 'answer.json', 'predicted.csv'
 _CASE, _ROBOT, _KNOWN = 'case.json', 'robot.yaml', 'known.yaml'

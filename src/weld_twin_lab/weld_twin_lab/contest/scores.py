@@ -16,14 +16,16 @@ from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.robots import load_robot
 
-from ..blind import layout
-from ..blind.achieved import NORMAL_90, counted
-from ..blind.ambiguous import Site
-from ..blind.displacement import rms
-from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
-from ..study import tabled
+from ..blind import seal
+from ..blind.cause_sizes import Site
+from ..blind.displacement import NORMAL_90, counted, rms
+from ..blind.scoring import CONFIDENT, IN_LIBRARY, answers_of
+from ..study import Study, listed, tabled
+from . import course
 from .course import Run
-from .open_form import Cause, ContestAnswer, Name
+from .entrants import ENTRANTS
+from .entrants.geometry import never_knows
+from .open_form import Cause, ContestAnswer, Name, read_case
 
 DENSITY, APART = 1.0 / np.sqrt(2.0 * np.pi), 1.0 / np.sqrt(np.pi)
 """Of a normal distribution of unit width: its density in the middle, and half the mean distance of two
@@ -51,10 +53,8 @@ class Sealed:
 
 def sealed(cases: Path, truths: Path, name: str, nominal: Array) -> Sealed:
     """Return the truth of a case; ``nominal`` is what the nominal arm predicts, shape (M, 3)."""
-    truth = layout.read(truths / name / layout.TRUTH)
-    test = read_recording(
-        truths / name / layout.TEST, load_robot(str(cases / name / layout.ROBOT))
-    )
+    truth = seal.read(truths / name / seal.TRUTH)
+    test = read_recording(truths / name / seal.TEST, load_robot(str(cases / name / seal.ROBOT)))
     assert test.measured is not None, 'a test is measured'
     good = counted(test, truth['outliers'])
     positions = test.measured.position
@@ -225,3 +225,44 @@ COLUMNS: dict[str, Callable[[Any], object]] = {
     'memory [MB]': lambda row: f'{row[1]["memory_bytes"] / 1e6:.0f}',
 }
 """Columns of the table of methods, each a name and its summary."""
+
+
+def run(study: Study) -> None:
+    """Run the contest and print the tables."""
+    args = study.args
+    methods = course.commands(listed(args.entrants) or list(ENTRANTS), args.enter)
+    content, table = _on_sealed(study, methods)
+    errors: course.Errors = {}
+    measured: dict[str, Array] = {}
+    if args.ur5 and args.ur10:
+        place = study.out / 'arms'
+        measured = course.arm_cases(Path(args.ur5), Path(args.ur10), place)
+        counts = {name: len(rows) for name, rows in measured.items()}
+        answers = study.out / 'arm_answers'
+        runs = course.run_all(place, list(measured), methods, answers, counts, study.tell)
+        errors = course.lefts(runs, measured)
+    content['arms_mean_m'] = errors
+    study.write('contest', content, course.page(table, errors, measured))
+
+
+def _on_sealed(study: Study, methods: dict[str, list[str]]) -> tuple[dict[str, Any], str]:
+    """Return what all methods are worth on the sealed cases, and the table."""
+    args, out = study.args, study.out
+    cases, truths = Path(args.cases), Path(args.truths)
+    names = course.opened(cases, truths, out / 'cases')[: args.first or None]
+    known = {name: read_case(out / 'cases' / name) for name in names}
+    truth = {
+        name: sealed(cases, truths, name, never_knows(case).predicted)
+        for name, case in known.items()
+    }
+    counts = {name: case.times.size for name, case in known.items()}
+    runs = course.run_all(out / 'cases', names, methods, out / 'answers', counts, study.tell)
+    content = {
+        'methods': {method: summary(said, truth) for method, said in runs.items()},
+        'troubles': {
+            method: {name: run.trouble for name, run in said.items() if run.trouble}
+            for method, said in runs.items()
+        },
+        'cases': names,
+    }
+    return content, page(runs, truth, f'{len(names)} cases.')

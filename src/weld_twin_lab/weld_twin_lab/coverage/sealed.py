@@ -29,15 +29,12 @@ from weld_twin_core.twin.twin import Twin
 from ..belief.mix import drawn
 from ..belief.trial import diagnosed, recordings_of
 from ..belief.visible import true_shares
-from ..blind.achieved import NORMAL_90, TO_90, gap_on, nominal_on
 from ..blind.blind_cell import GROSS, as_recording, exact, record
-from ..blind.cause_sizes import Cause, site
-from ..blind.displacement import rms
-from ..blind.everywhere import small_errors
+from ..blind.cause_sizes import Cause, site, small_errors
+from ..blind.displacement import NORMAL_90, TO_90, gap_on, nominal_on, rms
 from ..blind.making import SealedCase, one_arm
 from ..real_arms.unseen import flagged
-from .held import held, twin_for, within
-from .oracle import oracle_sigma
+from .held import held, oracle_sigma, twin_for, within
 
 PART = (0.005, 0.1)
 """Small errors, in parts of what machines have: a zero of 5 to 100 microradians, as an arm has it that

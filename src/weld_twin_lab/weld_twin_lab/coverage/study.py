@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +15,86 @@ import numpy as np
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.errors import TwinError
-from weld_twin_core.recording import Recording
+from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
+from weld_twin_core.diagnosis.predicting.planned import (
+    JUDGED,
+    SPREAD,
+    clear_postures,
+    plan_stations,
+)
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.posterior import expected_poses, largest_sigma
+from weld_twin_msgs_py.files.markdown import table
 from weld_twin_nodes.offline.task_pool import Task
 
+from ..blind.blind_cell import at_stations
+from ..blind.cause_sizes import small_errors
 from ..blind.displacement import rms
+from ..plant.tracker import Tracker
 from ..programs.cells import CELLS
-from ..real_arms.splits import TUNED_ON, Split, all_splits
+from ..real_arms.sources import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
-from ..study import require_simulator
+from ..study import Study, head, require_simulator, tabled
 from .held import held
 from .others import of_seam, of_touches, of_years
-from .planned import carried_out
 from .sealed import of_case, told_shrink
+
+ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
+COUNTS = (16, 24, 40)
+"""Stations of a plan."""
+NOISE = 3e-5
+"""Of every measured coordinate [m]."""
+TOLERANCE = 2e-4
+"""Of the tool [m]; plans are asked how probably it is kept."""
+UNSEEN = 60
+"""Other postures of the region, at which the corrected arm is judged."""
+FRAMES = [
+    {'effect': 'base_pose', 'xyz': [0.01, -0.02, 0.015], 'rotvec': [0.01, -0.008, 0.02]},
+    {'effect': 'tool_pose', 'xyz': [0.004, 0.003, -0.006], 'rotvec': [0.0, 0.0, 0.0]},
+]
+"""Where instrument and reflector really are: not known to the diagnosis."""
+
+
+def carried_out(seed: int) -> dict[str, Any]:
+    """
+    Return what a plan promised, what the diagnosis of its stations warns of, and what an arm keeps.
+
+    The arm is corrected with the effects in the middle of the allowed models.
+
+    seed: decides arm, its errors, the count and the noise.
+    """
+    rng = np.random.default_rng(seed)
+    robot = catalog.load(ARMS[seed % len(ARMS)])
+    count = COUNTS[seed // len(ARMS) % len(COUNTS)]
+    plan = plan_stations(robot, count, TOLERANCE, NOISE)
+    flaws = [*FRAMES, *small_errors(robot, rng)]
+    noisy = Tracker(sigma=NOISE, orientation=False)
+    seen = at_stations(robot, flaws, plan.q, noisy, rng)
+    motion = JointMotion(seen.t, plan.q, static=True)
+    found = diagnose(Recording('plan', motion, seen), robot, align='base,tool')
+    others = clear_postures(robot, SPREAD)[-UNSEEN:]
+    true = at_stations(robot, flaws, others, Tracker(orientation=False), rng).position
+    assert found.posterior is not None
+    still = Recording('others', JointMotion(np.arange(float(len(others))), others, static=True))
+    middle, _ = expected_poses(found.posterior, found.model.twin(0), still, still.joints.t)
+    off = true - middle.position
+    length = np.linalg.norm(off, axis=1)
+    judged = clear_postures(robot, SPREAD)[:JUDGED]
+    return {
+        'seed': seed,
+        'robot': robot.name,
+        'stations': count,
+        'status': found.status,
+        'promised_sigma_m': float(plan.sigma[-1]),
+        'promised_elsewhere_m': float(plan.elsewhere[-1]),
+        'warned_sigma_m': corrected_sigma(found.posterior, found.model, judged),
+        'warned_elsewhere_m': found.posterior.anywhere_m,
+        'promised_within': float(plan.within[-1]),
+        'kept_sigma_m': float(largest_sigma(np.einsum('mi,mj->ij', off, off)[None] / len(off))[0]),
+        'kept_within': float((length < TOLERANCE).mean()),
+    }
+
 
 APART = 10_000
 """How far apart the seeds of what is drawn by one number are."""
@@ -116,3 +184,173 @@ def _noise(other: Recording) -> Array:
     if other.measured.sigma is not None:
         return other.measured.sigma
     return np.full(other.measured.t.size, UR5_NOISE)
+
+
+Entry = dict[str, Any]
+REGIONS = ('inside', 'outside')
+HEAD = """# What 90 % regions of predictions hold
+
+Poor recordings of two measured arms, and cells of the plant, whose poses are judged where
+the tool really is; [how it was done](../../predictions.md#does-it-hold).
+"""
+
+
+def page(entries: Sequence[Entry]) -> str:
+    """Return the summary, what became of other promises, and the table of every recording."""
+    plans = [entry for entry in entries if 'promised_within' in entry]
+    rest = [entry for entry in entries if 'source' in entry]
+    tables = [summary_table(rest), promise_table(rest), entry_table(rest)]
+    if plans:
+        told = ', '.join(f'{key} {value:.3g}' for key, value in of_plans(plans).items())
+        tables.insert(2, f'Plans carried out: {told}.\n')
+    return '\n'.join([HEAD, *tables])
+
+
+def of_plans(plans: Sequence[Entry]) -> dict[str, float]:
+    """Return how plans of a first measurement compare with what came of them."""
+    ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in plans]
+    warned = [e['warned_sigma_m'] / e['promised_sigma_m'] for e in plans]
+    beyond = [e['warned_elsewhere_m'] / e['promised_elsewhere_m'] for e in plans]
+    return {
+        'plans': len(plans),
+        'kept over promised': float(np.median(ratio)),
+        'worst': max(ratio),
+        'warned over promised': float(np.median(warned)),
+        'the same elsewhere': float(np.median(beyond)),
+        'promised within tolerance': float(np.mean([e['promised_within'] for e in plans])),
+        'kept': float(np.mean([e['kept_within'] for e in plans])),
+    }
+
+
+def promises(entries: Sequence[Entry]) -> dict[str, list[dict[str, Any]]]:
+    """Return all intervals with what is true, by their kind."""
+    out: dict[str, list[dict[str, Any]]] = {}
+    for entry in entries:
+        for kind, told in entry.get('promises', {}).items():
+            out.setdefault(kind, []).extend(told)
+    return {kind: told for kind, told in out.items() if told}
+
+
+def promise_table(entries: Sequence[Entry]) -> str:
+    """Return how often the intervals of `promises` hold, and how wide they are."""
+    rows = []
+    for kind, told in promises(entries).items():
+        ends = np.array([one['ci90'] for one in told])
+        true = np.array([one['true'] for one in told])
+        above, below = true > ends[:, 1], true < ends[:, 0]
+        width = np.median((ends[:, 1] - ends[:, 0]) / np.maximum(np.abs(true), 1e-12))
+        rows.append(
+            [
+                kind,
+                str(true.size),
+                f'{1.0 - (above | below).mean():.1%}',
+                f'{below.mean():.1%}',
+                f'{above.mean():.1%}',
+                f'{width:.3f}',
+            ]
+        )
+    heads = ('interval of', 'number', 'held', 'truth below', 'above', 'width over the truth')
+    return table(heads, *rows)
+
+
+def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """Return the mean share held over recordings, by source, group and region."""
+    out = []
+    keys = dict.fromkeys((e['source'], e['group']) for e in entries)
+    for source, group in keys:
+        for region in REGIONS:
+            mine = [
+                e[region]
+                for e in entries
+                if (e['source'], e['group']) == (source, group) and region in e
+            ]
+            if mine:
+                out.append(_summary(source, group, region, mine))
+    return out
+
+
+def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dict[str, Any]:
+    held = np.array([e['held'] for e in mine])
+    known = [e for e in mine if e.get('oracle_sigma_m') and e['formal_sigma_m']]
+    wider, formal = (
+        [e['median_sigma_m'] / e[key] for e in known]
+        for key in ('oracle_sigma_m', 'formal_sigma_m')
+    )
+    poses = np.array([e['poses'] for e in mine])
+    return {
+        'source': source,
+        'group': group,
+        'region': region,
+        'recordings': len(mine),
+        'held': float(held.mean()),
+        'held_of_all_poses': float(np.average(held, weights=poses)),
+        'worst': float(held.min()),
+        'flagged': float(np.mean([e['flagged'] for e in mine])),
+        'over_oracle': float(np.median(wider)) if wider else None,
+        'over_formal': float(np.median(formal)) if formal else None,
+    }
+
+
+def summary_table(entries: Sequence[Entry]) -> str:
+    """Return the table of `summaries`."""
+    return tabled(SUMMARIES, summaries(entries))
+
+
+def entry_table(entries: Sequence[Entry]) -> str:
+    """Return the table of every recording and region."""
+    rows = [(entry, region) for entry in entries for region in REGIONS if region in entry]
+    return tabled(ENTRIES, rows)
+
+
+def _share(value: float | None, digits: int = 0) -> str:
+    return '' if value is None else f'{value:.{digits}%}'
+
+
+def _of(key: str, tell: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return what tells a number of a recording in a region."""
+    return lambda row: tell(row[0][row[1]][key])
+
+
+def _mm(value: float | None) -> str:
+    return '' if value is None else f'{value * 1e3:.3f} mm'
+
+
+def _wide(key: str) -> Callable[[Any], str]:
+    return lambda s: '' if s[key] is None else f'{s[key]:.2f}'
+
+
+SUMMARIES: dict[str, Callable[[Any], object]] = {
+    'of': itemgetter('source'),
+    'group': itemgetter('group'),
+    'poses': itemgetter('region'),
+    'recordings': itemgetter('recordings'),
+    'held': lambda s: _share(s['held'], 1),
+    'of all poses': lambda s: _share(s['held_of_all_poses'], 1),
+    'worst': lambda s: _share(s['worst']),
+    'flagged': lambda s: _share(s['flagged'], 1),
+    'width over the oracle': _wide('over_oracle'),
+    'over its formal one': _wide('over_formal'),
+}
+"""Columns of the table of summaries."""
+ENTRIES: dict[str, Callable[[Any], object]] = {
+    'recording': lambda row: row[0]['name'],
+    'status': lambda row: row[0]['status'],
+    'poses': itemgetter(1),
+    'number': _of('poses', str),
+    'held': _of('held', _share),
+    'not flagged': _of('held_unflagged', _share),
+    'flagged': _of('flagged', _share),
+    'mean error': _of('mean_error_m', _mm),
+    'sigma': _of('median_sigma_m', _mm),
+}
+"""Columns of the table of recordings, each with a region."""
+
+
+def run(study: Study) -> None:
+    """Try what is not tried yet, and print what it holds."""
+    args = study.args
+    drawn = args.cases, args.seams, args.touches, args.cells, args.plans
+    if bool(args.ur5) is not bool(args.ur10) or not (args.ur5 or any(drawn)):
+        raise DataError('give --ur5 and --ur10, or how many of what is to be drawn, or both')
+    entries = [e for e in study.tasks(tasks_of(args), 'holding promises') if e is not None]
+    study.write('coverage', head('coverage/3', entries=entries), page(entries))

@@ -14,7 +14,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
-from ..belief.logistic import Weights, fitted
+from ..belief.learning import Weights, fitted
 
 SIGNS = ('own', 'same', 'against')
 """Log odds of the answer, and those of the other diagnosis that speak for it, or against it."""

@@ -4,18 +4,39 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.advice import Limits
-from weld_twin_core.errors import TwinError
+from weld_twin_core.diagnosis.advice.candidates import LONGER
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.investigation import STATED, decided, question, short, signs, weighed
+from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, with_changes
+from weld_twin_report.report.diagnosis_files import diagnosis_text
 
-from .sealed_cell import SealedCell, as_motion
+from ..blind.blind_cell import WAYS, as_recording, of_motion, record
+from ..blind.deck import Lot
+from ..blind.making import SealedCase, draw_case, one_arm
+from ..blind.recorded_motion import RATE, Motion
+from ..blind.scoring import Judged, judge
+from ..blind.seal import text_digest
+from ..gate.mistakes import seen_from
 
 ROUNDS = 3
 """Experiments at most."""
@@ -158,3 +179,143 @@ def investigated(
                 'heard': heard,
             }
         )
+
+
+FOLLOWING, STATES = 30.0, 62.5
+"""Rates [Hz] of an instrument that follows the tool in an experiment, and of the joint states beside it.
+Twice as many say hardly more, for neighbours err alike, and a diagnosis then takes longer."""
+SECONDS = (12.0, 25.0)
+"""Shortest and longest first recording [s], where the arm moves: what is poor stays poor."""
+ELSEWHERE = transform(
+    Rotation.from_rotvec([0.05, -0.03, 0.7]).as_matrix(), np.array([1.2, -0.9, 0.1])
+)
+"""The frame of before in that of an instrument at another place, turned another way."""
+STAY = 15.0
+"""A station with the way to it [s], as experiments are planned."""
+
+
+class SealedCell:
+    """
+    One cell with causes at work that only `opened` tells.
+
+    lot: what the case is to be.
+    seed, number: decide everything random in it.
+
+    Attributes
+    ----------
+    robot : Robot
+        As whoever diagnoses knows it.
+    still : bool
+        Whether the instrument measures at rest alone.
+    poor : str
+        How the first recording is poor.
+    seal : str
+        The hash of the truth, published before anything is diagnosed.
+
+    """
+
+    def __init__(self, lot: Lot, seed: int, number: int) -> None:
+        rng = np.random.default_rng([seed, number])
+        self.name = f'{seed}-{number:04d}'
+        # Few stations are poor; of a path there is no few.
+        self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
+        self._case: SealedCase = one_arm(draw_case(lot, rng, SECONDS, poor=self.poor))
+        self._changed: dict[str, SetUpChange] = {}
+        self._salt = int(rng.integers(2**62))
+        self.robot: Robot = self._case.cell.robot
+        self.still = self._case.lot.motion == 'stations'
+
+    @property
+    def seal(self) -> str:
+        """Return the hash of the truth and a salt."""
+        return text_digest(json.dumps([self._salt, self._case.causes], default=float))
+
+    @cached_property
+    def _known(self) -> tuple[Effect, ...]:
+        return tuple(effects_from_list(list(self._case.cell.known), self.robot))
+
+    @cached_property
+    def first(self) -> Recording:
+        """The poor recording that everything begins with."""
+        return as_recording('first', record(self._case.cell, self._case.causes, self._case.train))
+
+    def made(self, name: str, motion: Motion, seed: int, changed: str = '') -> Recording:
+        """
+        Return the recording of a motion.
+
+        seed: decides noise and surroundings.
+        changed: what is changed in the cell for it, as `set_up_change` reads it.
+        """
+        rng = np.random.default_rng([seed, *name.encode()])
+        cell = self._case.cell
+        if not motion.static:
+            # The same where an instrument that follows had to be set up first.
+            slower = replace(cell.tracker, rate=FOLLOWING, joint_rate=STATES)
+            cell = replace(cell, tracker=slower)
+        if changed:
+            self._changed[name] = set_up_change(changed)
+            cell = replace(cell, robot=_changed(cell.robot, self._changed[name]))
+        taken = of_motion(cell, motion, rng)
+        made = as_recording(name, record(cell, self._case.causes, taken))
+        return seen_from(made, ELSEWHERE) if changed == 'instrument' else made
+
+    def seen_anew(self, recordings: Sequence[Recording]) -> bool:
+        """Return whether tool or instrument was changed for one of the recordings."""
+        return any(
+            r.name in self._changed and self._changed[r.name].kind in FRAMES for r in recordings
+        )
+
+    def diagnosed(self, recordings: list[Recording], **options: Any) -> dict[str, Any]:
+        """Return the content of diagnosis.json; it is told what was changed for which recording."""
+        names = [recording.name for recording in recordings]
+        changes = {names.index(name): c for name, c in self._changed.items() if name in names}
+        recordings, may_change = with_changes(recordings, changes, self.robot)
+        diagnosis = diagnose(
+            recordings,
+            self.robot,
+            align=self._case.cell.align,
+            known=self._known,
+            may_change=may_change,
+            **options,
+        )
+        return dict(json.loads(diagnosis_text(diagnosis, ())))
+
+    def opened(self) -> dict[str, Any]:
+        """Return the truth."""
+        return self._case.told(self.name)
+
+    def judged(self, diagnosis: Mapping[str, Any]) -> Judged:
+        """Return what a diagnosis is worth."""
+        return judge(self.opened(), diagnosis)
+
+
+def _changed(robot: Robot, change: SetUpChange) -> Robot:
+    """Return the arm with another load, or with a longer tool."""
+    if change.kind == 'load':
+        return replace(robot, payload_mass=robot.payload_mass + change.numbers[0])
+    if change.kind == 'tool':
+        longer = transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
+        return robot.with_frames(tool=robot.T_flange_tool @ longer)
+    return robot
+
+
+def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
+    """
+    Return a motion as it stands in an experiment, as the controller runs it.
+
+    asked: 'static', 'joint_names', 't' [s], 'q' [rad or m].
+
+    Raises DataError: it names other joints than the robot's.
+    """
+    if list(asked['joint_names']) != list(robot.joint_names):
+        raise DataError(f'the experiment is not for {robot.name}')
+    t, q = np.array(asked['t'], dtype=float), np.array(asked['q'], dtype=float)
+    if asked['static']:
+        return Motion(t - t[0], q, static=True)
+    even = np.arange(0.0, t[-1] - t[0], 1.0 / RATE)
+    return Motion(even, np.asarray(CubicSpline(t - t[0], q)(even)))
+
+
+def stations(q: Array) -> Motion:
+    """Return stations one after the other."""
+    return Motion(STAY * np.arange(len(q), dtype=float), q, static=True)

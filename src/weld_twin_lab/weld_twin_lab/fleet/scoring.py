@@ -12,7 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.history import Change, Observation, changes, outlook, reaches
 
-from ..blind.achieved import NORMAL_90
+from ..blind.displacement import NORMAL_90
 from .life import Event, Year
 
 WEEK = 7.0

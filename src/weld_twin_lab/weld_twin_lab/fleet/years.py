@@ -4,15 +4,26 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.history import Observation
 from weld_twin_msgs_py.files import markdown
 from weld_twin_nodes.offline.task_pool import Runner, Task
+from weld_twin_report.history import Entry, observations
+from weld_twin_report.history.words import likely, named
 
-from . import full_years
-from .cheap_years import cheap_year
-from .scoring import GRACE
+from ..study import Study, require_simulator
+from .life import Cause, Year, cause, diagnosed, draw, moved, set_up, year
+from .scoring import GRACE, WEEK, score
 
 Result = Mapping[str, Any]
 GOALS = {
@@ -64,14 +75,12 @@ def run_years(seed: int, years: int, cells: int, full: int, runner: Runner) -> d
     full: years that are diagnosed in full, of cells of their own.
     """
     wanted = [
-        Task(full_years.base, (seed, number, check), f'cell {number + 1}')
+        Task(base, (seed, number, check), f'cell {number + 1}')
         for number in range(cells + full)
-        for check in range(full_years.CHECKS)
+        for check in range(CHECKS)
     ]
     kept = runner.run(wanted)
-    bases = [
-        kept[full_years.CHECKS * k : full_years.CHECKS * (k + 1)] for k in range(cells + full)
-    ]
+    bases = [kept[CHECKS * k : CHECKS * (k + 1)] for k in range(cells + full)]
     drawn = runner.run(
         [Task(cheap_year, (seed, k, bases[k % cells]), f'year {k + 1}') for k in range(years)]
     )
@@ -86,12 +95,12 @@ def run_years(seed: int, years: int, cells: int, full: int, runner: Runner) -> d
 def _full(seed: int, number: int, bases: Sequence[Result], runner: Runner) -> dict[str, Any]:
     """Return what a year that is diagnosed in full came to."""
     first = bases[0]
-    year = full_years.lived(seed, number, first)
+    year = lived(seed, number, first)
     tasks = [
-        Task(full_years.check, (seed, number, week, set_up, first), f'week {week}')
+        Task(check, (seed, number, week, set_up, first), f'week {week}')
         for week, set_up in zip(year.weeks, year.set_ups, strict=True)
     ]
-    return full_years.scored(seed, number, first, runner.run(tasks))
+    return scored(seed, number, first, runner.run(tasks))
 
 
 def figures(years: Sequence[Result]) -> dict[str, Any]:
@@ -175,3 +184,157 @@ def _value(figures: Mapping[str, Any], name: str) -> str:
     if value is None:
         return ''
     return f'{value:.2f}' if name == 'false_a_year' else f'{100.0 * value:.1f} %'
+
+
+FIRST = datetime(2026, 1, 5, tzinfo=timezone.utc)
+"""Monday of week 0."""
+CHECKS = 2
+"""Sets of stations of a cell."""
+
+
+def base(seed: int, number: int, check: int) -> dict[str, Any]:
+    """Return the entry of one check of a cell on its first day."""
+    rng = np.random.default_rng([seed, number, check])
+    yearly = draw(seed, number)
+    causes = [*yearly.as_built, set_up(rng)]
+    drawn = int(rng.integers(2**31))
+    with tempfile.TemporaryDirectory(prefix='years-') as place:
+        entry = diagnosed(yearly, causes, check, drawn, Path(place) / 'check', FIRST)
+    return entry.plain()
+
+
+def lived(seed: int, number: int, first: Mapping[str, Any]) -> Year:
+    """Return what happens on a cell in the year that is diagnosed in full."""
+    return year(Entry.of_plain(first), np.random.default_rng([seed, 2_000_000 + number]))
+
+
+def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[str, Any]) -> Any:
+    """Return the entry of one week's check."""
+    yearly = draw(seed, number)
+    off = moved(lived(seed, number, first).events, week)
+    stands = set_up(np.random.default_rng([seed, number, 3, set_up_number]))
+    causes = [*_together([*yearly.as_built, *(cause(n, v) for n, v in off.items())]), stands]
+    drawn = int(np.random.default_rng([seed, number, 4, week]).integers(2**31))
+    at = FIRST + timedelta(weeks=week)
+    with tempfile.TemporaryDirectory(prefix='years-') as place:
+        stations = set_up_number % CHECKS
+        entry = diagnosed(yearly, causes, stations, drawn, Path(place) / 'check', at)
+    return entry.plain()
+
+
+def _together(causes: Sequence[Cause]) -> list[Cause]:
+    """Return flaws with those of one kind at one place added up."""
+    out: dict[tuple[str, str | None], Cause] = {}
+    for each in causes:
+        key = str(each['effect']), each.get('joint')
+        before = out.get(key)
+        if before is None:
+            out[key] = dict(each)
+            continue
+        for name, value in each.items():
+            if isinstance(value, float):
+                before[name] += value
+            elif isinstance(value, list):
+                before[name] = [a + b for a, b in zip(before[name], value, strict=True)]
+    return list(out.values())
+
+
+def scored(
+    seed: int, number: int, first: Mapping[str, Any], kept: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return what the weekly looks at a year of diagnoses came to."""
+    entries = [Entry.of_plain(each) for each in kept]
+    start = FIRST.timestamp() / 86_400.0
+    seen = [replace(o, day=o.day - start) for o in observations(entries)]
+    yearly = draw(seed, number)
+    truth = {
+        f'{each["effect"]} {each["joint"]} 0': float(
+            next(v for k, v in each.items() if k not in ('effect', 'joint'))
+        )
+        for each in yearly.as_built
+    }
+    joints = yearly.cell.robot.joint_names
+    scores = score(
+        seen, lived(seed, number, first), named(entries), likely(entries), joints, truth
+    )
+    status = dict(Counter(each.status for each in entries))
+    return {**scores, 'status': status, 'weeks': len(entries), 'unit': WEEK}
+
+
+def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """
+    Return what a year of weekly looks came to.
+
+    seed, number: of the year; the same numbers give the same year.
+    bases: entries of the cell's checks.
+    """
+    rng = np.random.default_rng([seed, 1_000_000 + number])
+    checks = _common([Entry.of_plain(base) for base in bases])
+    lived = year(checks[0], rng)
+    # What the first check leaves open, the arm may have: its values are drawn from what it says.
+    arm = rng.multivariate_normal(checks[0].value, checks[0].covariance, method='eigh')
+    truth = dict(zip(checks[0].names, map(float, arm), strict=True))
+    seen = drawn(checks, lived, truth, rng)
+    return score(seen, lived, named(checks), likely(checks), _joints(checks[0]), truth)
+
+
+def _common(entries: Sequence[Entry]) -> list[Entry]:
+    """Return entries with only the coordinates that all have, in the same order."""
+    names = [n for n in entries[0].names if all(n in each.names for each in entries)]
+    out = []
+    for each in entries:
+        at = [each.names.index(name) for name in names]
+        out.append(
+            replace(
+                each,
+                names=tuple(names),
+                value=each.value[at],
+                prior_std=each.prior_std[at],
+                covariance=each.covariance[np.ix_(at, at)],
+            )
+        )
+    return out
+
+
+def drawn(
+    checks: Sequence[Entry], lived: Year, truth: Mapping[str, float], rng: np.random.Generator
+) -> list[Observation]:
+    """Return the observations of a year: the arm as it is each week, seen through a check."""
+    seen = observations(checks)
+    shown = [each.information()[0] for each in seen]
+    roots = [_root(each) for each in shown]
+    out = []
+    for week, number in zip(lived.weeks, lived.set_ups, strict=True):
+        k = number % len(checks)
+        check = seen[k]
+        off = moved(lived.events, week)
+        theta = np.array([truth[name] + off.get(name, 0.0) for name in check.names])
+        information = shown[k] @ theta + roots[k] @ rng.normal(size=theta.size)
+        value = check.covariance @ information
+        out.append(replace(check, day=WEEK * week, value=value))
+    return out
+
+
+def _root(precision: Array) -> Array:
+    known, axes = np.linalg.eigh(precision)
+    return np.asarray(axes * np.sqrt(np.maximum(known, 0.0)))
+
+
+def _joints(check: Entry) -> list[str]:
+    """Return the arm's joints in their order."""
+    family = 'joint_offset '
+    return [name.split(' ')[1] for name in check.names if name.startswith(family)]
+
+
+def run(study: Study) -> bool:
+    """Run what is not done yet, write the results, print the table."""
+    require_simulator()
+    args = study.args
+    with study.runner('living through years') as runner:
+        result = run_years(args.seed, args.years, args.cells, args.full, runner)
+    study.write('years', result, page(result, args.seed, args.cells))
+    kept = {name: result['drawn'][name] for name in GOALS}
+    return all(
+        value is not None and GOALS[name][0] <= value <= GOALS[name][1]
+        for name, value in kept.items()
+    )

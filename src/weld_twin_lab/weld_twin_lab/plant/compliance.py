@@ -10,11 +10,12 @@ in `tree`.
 
 from functools import cached_property
 
+import mujoco
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from . import mujoco_model
-from .exponentials import Arm
-from .plant_recording import Entry
+from . import exponentials, mujoco_model
+from .exponentials import Arm, Entry, Motion
 from .textbook_effects import Causes
 
 HARDENING = 0.03
@@ -92,3 +93,124 @@ class Compliant:
         """Return gaps and springs over a sequence of poses at rest, shape (N, n)."""
         gap = self.play(q)
         return np.asarray(gap + self.sag(q + gap, wrench))
+
+
+STRETCH = 0.5
+"""Share by which the tension grows when the hose is twice as long: balancers keep it steady."""
+WEIGHT = 0.2
+"""Weight of half the hose over its tension."""
+
+
+def pull(causes: Causes, arm: Arm, q: np.ndarray) -> np.ndarray | None:
+    """
+    Return the pull of the hoses as a wrench on the tool, tool frame, (N, 6) [N, N m], or None.
+
+    causes: entries of hose_pull: hook [m] in the base frame, tension [N], length [m].
+    q: shape (N, n).
+    """
+    hoses = list(causes.of('hose_pull'))
+    if not hoses:
+        return None
+    flange = exponentials.flange(arm, exponentials.home(arm), q)
+    force = np.zeros((len(q), 3))
+    for item in hoses:
+        way = np.asarray(item['hook'], dtype=float) - flange.position
+        far = np.linalg.norm(way, axis=1, keepdims=True)
+        share = 1.0 + STRETCH * (far / float(item['length']) - 1.0)
+        force += float(item['tension']) * share * way / far
+        force[:, 2] -= WEIGHT * float(item['tension'])
+    tool = exponentials.compose(flange, arm.tool)
+    moment = np.cross(flange.position - tool.position, force)
+    return np.hstack([np.einsum('nji,nj->ni', tool.rotation, part) for part in (force, moment)])
+
+
+def with_hoses(
+    causes: Causes, arm: Arm, q: np.ndarray, wrench: np.ndarray | None
+) -> np.ndarray | None:
+    """Return a wrench on the tool, (N, 6) or None, with what the hoses add to it."""
+    more = pull(causes, arm, q)
+    if more is None:
+        return wrench
+    return more if wrench is None else wrench + more
+
+
+ROUNDS = 4
+"""Times that the balance is sought anew; each takes away all but a thousandth."""
+COARSE = 0.02
+"""Spacing [s] at which the lean is computed; it changes with the posture, which is slow."""
+
+
+class Pedestal:
+    """
+    The springs under an arm.
+
+    parts: the arm with its load.
+    """
+
+    def __init__(self, parts: Compliant, causes: Causes) -> None:
+        self.parts = parts
+        self.compliance = causes.total('pedestal_tilt', 'compliance', 2)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether nothing leans."""
+        return not self.compliance.any()
+
+    def at_rest(self, q: np.ndarray, wrench: np.ndarray | None) -> Motion:
+        """Return how the base has turned at postures (N, n), in its own frame."""
+        return _turned(self._balance(q, wrench, np.zeros((len(q), 2))))
+
+    def moving(
+        self, grid: np.ndarray, motor: CubicSpline, wrench: np.ndarray | None, t: np.ndarray
+    ) -> Motion:
+        """
+        Return how the base of a moving arm has turned, in its own frame.
+
+        grid: evenly spaced, shape (N,) [s]; wrenches are given there.
+        motor: joint positions over time.
+        wrench: shape (N, 6).
+        t: when the lean is wanted, shape (M,) [s].
+        """
+        coarse = np.arange(0, len(grid), max(1, round(COARSE / float(grid[1] - grid[0]))))
+        at = grid[coarse]
+        q, qd, qdd = (_under(motor(at, order)) for order in range(3))
+        shaken = -self.parts.richness * self._statics.drive_torque(q, qd, qdd)[:, :2]
+        load = None if wrench is None else wrench[coarse]
+        return _turned(CubicSpline(at, self._balance(q[:, 2:], load, shaken))(t))
+
+    @cached_property
+    def _statics(self) -> mujoco_model.Statics:
+        return mujoco_model.Statics(self._model())
+
+    def _model(self) -> mujoco.MjModel:
+        parts, spec = self.parts, mujoco.MjSpec()
+        foot = spec.worldbody.add_body(name='pedestal')
+        mujoco_model.weigh(foot, mujoco_model.MASSLESS, np.zeros(3), 1e-9)
+        for name, axis in (('x', [1, 0, 0]), ('y', [0, 1, 0])):
+            foot.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+        at = exponentials.home(parts.arm)
+        links = mujoco_model.add_links(spec, parts.robot, parts.arm, parts.load, foot)
+        for i, body in enumerate(links):
+            mujoco_model.add_hinge(body, parts.arm, at, i, f'joint{i}')
+        return spec.compile()
+
+    def _balance(self, q: np.ndarray, wrench: np.ndarray | None, shaken: np.ndarray) -> np.ndarray:
+        """Return the lean about x and y, shape (N, 2) [rad]."""
+        lean = np.zeros((len(q), 2))
+        for _ in range(ROUNDS):
+            moment = self._statics.torque(np.hstack([lean, q]), wrench)[:, :2] + shaken
+            peak = np.abs(self.compliance * moment).max(axis=0) + 1e-15
+            gain = HARDENING * self.parts.richness
+            lean = self.compliance * moment / (1.0 - 0.5 * gain + gain * (lean / peak) ** 2)
+        return lean
+
+
+def _under(q: np.ndarray) -> np.ndarray:
+    """Return joint values with two hinges under them that stand still, shape (N, 2 + n)."""
+    return np.hstack([np.zeros((len(q), 2)), q])
+
+
+def _turned(lean: np.ndarray) -> Motion:
+    return exponentials.compose(
+        exponentials.turn('x', lean[:, 0]), exponentials.turn('y', lean[:, 1])
+    )

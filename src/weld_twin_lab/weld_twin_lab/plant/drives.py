@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from . import rollout
-from .plant_recording import Course, Entry
+from .exponentials import Course, Entry
 from .textbook_effects import Causes
 
 STEP = 5e-4

@@ -29,10 +29,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import screws
-from .exponentials import Arm
-from .plant_recording import Entry
-from .screws import Motion
+from . import exponentials
+from .exponentials import Arm, Entry, Motion
 from .textbook_effects import LIBRARY, Causes
 
 PARTS = ('joint', 'axis', 'base', 'tool', 'hand', 'stand', 'sight')
@@ -105,10 +103,10 @@ def any_on_joints(causes: Causes) -> bool:
 
 def frame(part: str, here: Here) -> Motion:
     """Return how far the base or the tool is from where the arm's file has it, (M,)."""
-    total = screws.identity()
+    total = exponentials.identity()
     for function, items in _of(part, here.causes):
         moved = sum(function(item, here) for item in items)
-        total = screws.compose(total, screws.from_rotvec(moved[:, 3:], moved[:, :3]))
+        total = exponentials.compose(total, exponentials.from_rotvec(moved[:, 3:], moved[:, :3]))
     return total
 
 

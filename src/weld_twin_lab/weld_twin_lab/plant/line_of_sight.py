@@ -12,9 +12,8 @@ less so the richer the physics.
 
 import numpy as np
 
+from .exponentials import Entry, Motion
 from .flaws import Here, flaw
-from .plant_recording import Entry
-from .screws import Motion
 
 REFRACTION = 2.256e-4
 """Refractivity over density [m^3/kg]: 2.717e-4 at 1.204 kg/m^3 (emtoolbox.nist.gov, appendix B)."""

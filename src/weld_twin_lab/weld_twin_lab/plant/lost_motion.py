@@ -17,9 +17,11 @@ gear_ratio_by_direction
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from . import exponentials
+from .exponentials import Entry
 from .flaws import Here, flaw
-from .plant_recording import Entry
 
 PRESLIDING = 3e-4
 """Travel [rad] over which bristles bend."""
@@ -96,3 +98,41 @@ def _contacts(q: np.ndarray, travel: float) -> np.ndarray:
         np.minimum(bent, gives, out=bent)
         row[:] = bent
     return np.asarray((out / gives).mean(axis=1))
+
+
+@flaw('tool')
+def wear(entry: Entry, here: Here) -> np.ndarray:
+    """
+    Return the tool's tip as wear has drawn it back along its z.
+
+    The rate is that of the first second, and falls off with the time constant `slower` [s].
+    """
+    back, slower = np.zeros((len(here.t), 6)), float(entry.get('slower', 1e6))
+    back[:, 2] = float(entry['rate']) * slower * np.expm1(-here.t / slower)
+    return back
+
+
+FLAT = 0.4
+"""Share by which a bracket of sheet metal bends less about its second axis."""
+ROUNDS = 3
+"""Times that the balance is sought anew; the bar turns by a milliradian, so two would do."""
+
+
+@flaw('tool')
+def tool_sag(entry: Entry, here: Here) -> np.ndarray:
+    """
+    Return how the torch has turned about its bracket, and its tip with it.
+
+    bend: way of the tip [m] where the torch is level.
+    lever: from the bracket to the tip, in the tool frame, shape (3,) [m].
+    """
+    lever = np.asarray(entry['lever'], dtype=float)
+    length = np.linalg.norm(lever)
+    soft = float(entry['bend']) / length * np.array([1.0, 1.0 - FLAT * here.richness, 1.0])
+    flange = exponentials.flange(here.arm, exponentials.home(here.arm), here.q)
+    weight = -exponentials.compose(flange, here.arm.tool).rotation[..., 2, :]
+    turn = np.zeros((len(here.q), 3))
+    for _ in range(ROUNDS):
+        bar = Rotation.from_rotvec(turn).apply(lever)
+        turn = soft * np.cross(bar / length, weight)
+    return np.hstack([Rotation.from_rotvec(turn).apply(lever) - lever, turn])

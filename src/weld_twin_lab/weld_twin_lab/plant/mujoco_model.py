@@ -15,10 +15,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from . import exponentials, screws
-from .exponentials import Arm
-from .plant_recording import Entry
-from .screws import Motion
+from . import exponentials
+from .exponentials import Arm, Entry, Motion
 
 MASSLESS = 1e-6
 """Mass [kg] of a body that has none; MuJoCo wants some on every moving body."""
@@ -62,9 +60,11 @@ def add_links(
     """Add links, tool and payload on a foot or the floor, no joints; return the link bodies."""
     spec.option.gravity = list(robot.get('gravity', STANDARD_GRAVITY))
     at = exponentials.home(arm)
-    parent, before, bodies = foot or spec.worldbody, screws.identity(), []
+    parent, before, bodies = foot or spec.worldbody, exponentials.identity(), []
     for i, pose in enumerate(at.links):
-        parent = _add_body(parent, f'link{i}', screws.compose(screws.inverse(before), pose))
+        parent = _add_body(
+            parent, f'link{i}', exponentials.compose(exponentials.inverse(before), pose)
+        )
         before = pose
         _add_mass(parent, robot, i, _reach(arm, i))
         bodies.append(parent)
@@ -73,7 +73,7 @@ def add_links(
     weigh(tool, MASSLESS, np.zeros(3), 1e-9)
     if load.mass > 0.0:
         weigh(
-            _add_body(tool, 'payload', screws.identity()),
+            _add_body(tool, 'payload', exponentials.identity()),
             load.mass,
             load.com,
             load.mass * SMALL**2,
@@ -111,7 +111,9 @@ def add_hinge(
     link = at.links[i]
     axis = at.v[i] if arm.sliding[i] else at.omega[i]
     kind = mujoco.mjtJoint.mjJNT_SLIDE if arm.sliding[i] else mujoco.mjtJoint.mjJNT_HINGE
-    anchor = screws.compose(screws.inverse(link), Motion(np.eye(3), at.point[i])).position
+    anchor = exponentials.compose(
+        exponentials.inverse(link), Motion(np.eye(3), at.point[i])
+    ).position
     return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor, **options)
 
 

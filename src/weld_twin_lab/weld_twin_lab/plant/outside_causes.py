@@ -22,10 +22,9 @@ Times count from the recording's first stamp.
 
 import numpy as np
 
-from . import screws
+from . import exponentials
+from .exponentials import Entry, Motion
 from .flaws import Here, flaw
-from .plant_recording import Entry
-from .screws import Motion
 
 STUCK_AFTER = 0.3
 """Share of the wind-up that a jump leaves."""
@@ -119,7 +118,7 @@ def tool_slip(entry: Entry, here: Here) -> np.ndarray:
 def station_step(entry: Entry, here: Here, pose: Motion) -> Motion:
     """Return the pose in a measuring frame that was knocked."""
     off = _come(entry, here.t)
-    return screws.compose(screws.from_rotvec(off[:, 3:], off[:, :3]), pose)
+    return exponentials.compose(exponentials.from_rotvec(off[:, 3:], off[:, :3]), pose)
 
 
 @flaw('sight')

@@ -17,15 +17,12 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import drives, exponentials, flaws, hose, rollout, screws, tree
+from . import compliance, drives, exponentials, flaws, rollout, tree
 from . import textbook_effects as library
 from . import tracker as sensors
-from .compliance import Compliant
-from .exponentials import Arm
+from .compliance import Compliant, Pedestal
+from .exponentials import Arm, Command, Course, Entry, Motion, PlantRecording
 from .flaws import Here
-from .pedestal import Pedestal
-from .plant_recording import Command, Course, Entry, PlantRecording
-from .screws import Motion
 from .textbook_effects import Causes
 from .tracker import Tracker
 
@@ -79,7 +76,7 @@ class _Cell:
 
     def with_hoses(self, q: np.ndarray, wrench: np.ndarray | None) -> np.ndarray | None:
         """Return a wrench on the tool at positions q with what the hoses add to it."""
-        return hose.with_hoses(self.causes, self.arm, q, wrench)
+        return compliance.with_hoses(self.causes, self.arm, q, wrench)
 
     @cached_property
     def torque(self) -> np.ndarray:
@@ -124,7 +121,7 @@ class _Cell:
     def leaned(self, t: np.ndarray) -> Motion:
         """Return how the base has turned at true times (M,) [s], in its own frame."""
         if self.pedestal.stiff:
-            return screws.identity()
+            return exponentials.identity()
         command = self.course.command
         if command.static:
             q = command.q + library.gearing(self.causes, command.q)
@@ -218,12 +215,12 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     base, tool = library.frames(causes, arm)
     here = cell.here(t, motor, rng, wrench=cell.course.wrench(t))
     lean = flaws.on_joints(here, 'axis')
-    base = screws.compose(base, flaws.frame('base', here), cell.leaned(t))
-    tool = screws.compose(tool, flaws.frame('tool', here))
+    base = exponentials.compose(base, flaws.frame('base', here), cell.leaned(t))
+    tool = exponentials.compose(tool, flaws.frame('tool', here))
     flange = exponentials.flange(
         arm, exponentials.home(arm, rows), q, lean if lean.any() else None
     )
-    pose = screws.compose(base, flange, tool)
+    pose = exponentials.compose(base, flange, tool)
     pose = library.yielding(causes, pose, here.wrench)
     return library.measured(causes, flaws.seen(here, pose, 'hand', 'stand', 'sight'), since)
 

@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import odeint
 
-from . import screws
-from .exponentials import Arm, Rows
-from .plant_recording import Entry
-from .screws import Motion
+from . import exponentials
+from .exponentials import Arm, Entry, Motion, Rows
 
 REFERENCE_TEMPERATURE = 20.0
 """Temperature [degC] at which the arm has the lengths of its file, as for gauges (ISO 1)."""
@@ -182,7 +180,7 @@ def frames(causes: Causes, arm: Arm) -> tuple[Motion, Motion]:
     """Return the base in the world and the tool on the flange, as they really are."""
 
     def error(effect: str) -> Motion:
-        return screws.from_rotvec(
+        return exponentials.from_rotvec(
             causes.total(effect, 'rotvec', 3), causes.total(effect, 'xyz', 3)
         )
 

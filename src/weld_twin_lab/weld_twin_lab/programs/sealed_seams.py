@@ -21,10 +21,9 @@ from weld_twin_nodes.offline.exporting import Speeds, export
 from ..blind.blind_cell import BlindCell, as_recording, record
 from ..blind.deck import Lot, lots
 from ..blind.making import SealedCase, draw_case, one_arm
-from ..blind.recorded_motion import RATE
-from ..blind.seams import drawn_seam
+from ..blind.recorded_motion import RATE, drawn_seam
+from ..plant.exponentials import Command, PlantRecording
 from ..plant.plant import run
-from ..plant.plant_recording import Command, PlantRecording
 from ..plant.tracker import Tracker
 from .cells import CELLS, context_on, robots_of
 from .plain_controller import Driven, evenly

@@ -13,10 +13,15 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.files.input_files import hashed
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.tables import read_table
+from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
+from ..study import Study
 from .splits import alone
 from .unseen import ALIGN, PLAIN, plain_fit, residual
 
@@ -102,3 +107,18 @@ def table(name: str, done: Sequence[Fold]) -> str:
         *(f'* {", ".join(fold.names) or "nothing"}' for fold in done),
     ]
     return '\n'.join(lines) + '\n'
+
+
+def run(study: Study) -> None:
+    """Judge every stretch, diagnose the whole, write table and page, print the table."""
+    args = study.args
+    if args.folds < 2:
+        raise ModelError(f'--folds {args.folds}: give two stretches or more')
+    robot = args.load_robot()
+    recording = read_table(args.table, robot).recording
+    with args.output(RESULT) as place:
+        page = table(recording.name, folds(recording, robot, args.folds, study.tell))
+        write_text(place / 'efforts.md', page)
+        whole = diagnose(recording, robot, align=ALIGN)
+        write_results(place, whole, [hashed('recording', args.table)], args.find_urdf())
+    print(page, end='')

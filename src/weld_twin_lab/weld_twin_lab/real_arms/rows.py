@@ -16,9 +16,8 @@ from weld_twin_core.contacts import Contacts
 from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
-from . import sources, splits
-from .sources import Source
-from .splits import Rows, alone
+from . import sources
+from .sources import Rows, Source, alone
 
 COUNTS = (15, 30, 60, 120)
 """Stations of a subset: from hardly enough to plenty."""
@@ -125,7 +124,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording] | None:
     touched = recording.contacts is not None
     if not recording.joints.static or touched or size(recording) < HALVED:
         return None
-    return splits.halves(recording)
+    return sources.halves(recording)
 
 
 def size(recording: Recording) -> int:

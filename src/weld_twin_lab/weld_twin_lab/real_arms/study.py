@@ -16,11 +16,15 @@ from weld_twin_core.contacts import spreads
 from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
+from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
+from weld_twin_nodes.offline.task_pool import Task
 
 from ..belief.learning import NAMES
+from ..belief.rows import write_rows
 from ..blind.displacement import rms
-from ..study import tabled
+from ..study import Study, head, tabled
+from . import poor
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
 from .unseen import PLAIN, plain_fit, residual, tried
@@ -286,3 +290,22 @@ def _spread(model: Model, other: Recording) -> float:
     points = model.twin(0).poses(other, other.joints.t).position
     each = np.concatenate(list(spreads(other.contacts, points).values()))
     return float(np.sqrt((each**2).mean()))
+
+
+def run(study: Study) -> bool:
+    """Judge what is not judged yet, write and print the table."""
+    data = study.args.data
+    if not Path(data).is_dir():
+        raise DataError(f"'{data}' is no directory; --data names the parent of the recordings")
+    every = poor.names(data) if study.args.poor else [plan.name for plan in plans()]
+    judge = poor.judged if study.args.poor else judged
+    tasks = [Task(judge, (data, name), name) for name in every if study.args.only in name]
+    entries = study.tasks(tasks, 'diagnosing')
+    if study.args.poor:
+        measures = poor.measures(entries)
+        result = head('transfer/1', measures=[m._asdict() for m in measures], splits=entries)
+        study.write('poor', result, poor.page(entries, measures))
+        return all(m.reached is not False for m in measures)
+    study.write('real_arms', {'summary': summary(entries), 'rows': entries}, table(entries))
+    write_rows(study.out / 'told.jsonl', taught(entries))
+    return True

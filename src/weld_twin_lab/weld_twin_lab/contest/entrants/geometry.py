@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,9 +16,58 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
+from weld_twin_core.recording import JointMotion
 
-from ..open_form import ContestAnswer, ContestCase
-from .residual import as_causes
+from ..open_form import Cause, ContestAnswer, ContestCase
+
+Learn = Callable[[Array, Array, Array], tuple[Array, Array | None]]
+"""
+Takes features (N, k), errors of the nominal arm there (N, 3) [m] and the features asked for (M, k);
+returns the errors there (M, 3) [m], and their standard deviations where it has any.
+"""
+
+
+def answer_of(case: ContestCase, learn: Learn, most: int | None = None) -> ContestAnswer:
+    """
+    Return the nominal arm plus what a learner adds; it names nothing.
+
+    most: samples that it learns from, spread evenly; left out, all.
+    """
+    count = case.measured.t.size
+    rows = np.unique(np.linspace(0, count - 1, most or count).astype(int))
+    known = features(case.train.joints, case.measured.t[rows])
+    added, sigma = learn(known, off(case)[rows], features(case.ask.joints, case.times))
+    there = nominal(case, case.ask.joints, case.times)
+    return ContestAnswer(there + added, unknown=1.0, sigma=sigma)
+
+
+def as_causes(sizes: Mapping[tuple[str, str | None], float]) -> tuple[Cause, ...]:
+    """Return causes by their sizes, the largest first, each as likely as its share of the whole."""
+    whole = sum(sizes.values())
+    ranked = sorted(sizes.items(), key=lambda item: -item[1])
+    return tuple(((*at, size / whole),) for at, size in ranked)
+
+
+def nominal(case: ContestCase, motion: JointMotion, t: Array) -> Array:
+    """Return where the nominal tool is, shape (M, 3) [m]."""
+    q, _ = motion.at(t)
+    return np.asarray(forward(case.robot, q)[:, :3, 3])
+
+
+def off(case: ContestCase) -> Array:
+    """Return measured minus nominal position, shape (M, 3) [m]."""
+    measured = case.measured
+    return np.asarray(measured.position - nominal(case, case.train.joints, measured.t))
+
+
+def features(motion: JointMotion, t: Array) -> Array:
+    """Return sine and cosine of the angles, and, of a motion, velocities and their signs."""
+    q, qd = motion.at(t)
+    columns = [np.sin(q), np.cos(q)]
+    if not motion.static:
+        columns += [qd, np.tanh(qd / max(1e-9, 0.02 * float(np.abs(qd).max(initial=0.0))))]
+    return np.hstack(columns)
+
 
 FAMILY = {'a': 'link_length', 'd': 'link_length', 'alpha': 'link_twist', 'theta': 'joint_offset'}
 """What a library of effects calls an error of each DH value."""
@@ -42,7 +92,7 @@ class Fitted:
     robot: Robot
 
 
-def answer(case: ContestCase) -> ContestAnswer:
+def geometry(case: ContestCase) -> ContestAnswer:
     """Return the values that are off, by how far they move the tool."""
     return answer_with(case, ALL)
 
@@ -105,3 +155,35 @@ def _moved(robot: Robot, names: tuple[tuple[str, int], ...], values: Array) -> R
         T_world_base=robot.T_world_base @ base,
         T_flange_tool=robot.T_flange_tool @ tool,
     )
+
+
+def zero_offset(case: ContestCase) -> ContestAnswer:
+    """Return the joint whose zero moves the tool most, without a doubt."""
+    fitted = fit(case, ('theta',))
+    row = int(fitted.effect[: case.robot.n].argmax())
+    predicted = answer_with(case, ('theta',)).predicted
+    return ContestAnswer(predicted, ((('joint_offset', case.robot.joint_names[row], 1.0),),))
+
+
+DRAWS = 20
+"""Of poses: a standard deviation of so many is good to a sixth."""
+
+
+def bootstrap(case: ContestCase) -> ContestAnswer:
+    """Return what `geometry` says, and by how much its predictions scatter beside what it leaves."""
+    rng, measured = np.random.default_rng(0), case.measured
+    asked, _ = case.ask.joints.at(case.times)
+    predictions = []
+    for _ in range(DRAWS):
+        rows = np.sort(rng.choice(measured.t.size, measured.t.size))
+        drawn = replace(case, train=case.train.with_measured(measured.take(np.unique(rows))))
+        predictions.append(forward(fit(drawn, ALL).robot, asked)[:, :3, 3])
+    seen, _ = case.train.joints.at(measured.t)
+    remaining = measured.position - forward(fit(case, ALL).robot, seen)[:, :3, 3]
+    sigma = np.sqrt(np.var(predictions, axis=0, ddof=1) + (remaining**2).mean())
+    return replace(answer_with(case, ALL), sigma=sigma)
+
+
+def never_knows(case: ContestCase) -> ContestAnswer:
+    """Return that the cause is unknown."""
+    return ContestAnswer(nominal(case, case.ask.joints, case.times), unknown=1.0)

@@ -16,7 +16,7 @@ from weld_twin_core.recording import JointMotion
 
 from ...blind.displacement import rms
 from ..open_form import ContestAnswer, ContestCase
-from .residual import as_causes, nominal, off
+from .geometry import as_causes, nominal, off
 
 TERMS = ('joint_offset', 'transmission_ripple', 'transmission_ripple', 'servo_lag', 'backlash')
 """What a constant, a sine, a cosine, a velocity and its sign in a joint's error stand for."""
@@ -28,7 +28,7 @@ STEP = 1e-6
 """Of the differences by which a joint's pull on the tool is found [rad]."""
 
 
-def answer(case: ContestCase) -> ContestAnswer:
+def sparse_regression(case: ContestCase) -> ContestAnswer:
     """Return the terms that are left, by their share in the error, and what they predict."""
     measured = case.measured
     columns = _columns(case, case.train.joints, measured.t)

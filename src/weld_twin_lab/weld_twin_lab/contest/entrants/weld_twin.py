@@ -24,7 +24,7 @@ TO_SIGMA = 1.4826
 """Standard deviation of normal noise in median absolute deviations; a few outliers do not count."""
 
 
-def answer(case: ContestCase) -> ContestAnswer:
+def weld_twin(case: ContestCase) -> ContestAnswer:
     """Return the verdict: every name with its probability, and the prediction of the model."""
     twin = build_twin(case.robot, '' if case.known is None else case.known)
     diagnosis = diagnose(

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A PostgreSQL server of one's own: made in a folder, reached by a socket there, gone afterwards."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import shutil

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A page as lines of text: what is read, what its scripts are given, and how long its bars are."""
 
-from __future__ import annotations
-
 import json
 import re
 from html.parser import HTMLParser

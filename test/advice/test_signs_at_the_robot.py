@@ -7,8 +7,6 @@ The controllers are written here: each turns counts of a motor into a reading by
 maker keeps a zero in. The arm is the laboratory's, which shares no formula with the twin.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 

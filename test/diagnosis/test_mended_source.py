@@ -6,8 +6,6 @@ What --apply undid is undone again wherever its model meets the same source, and
 The arm that is recorded is worked out row by row by the laboratory's plain arm, not by the twin.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A zero that is a tilt of axes on any motion is told as the zero, which a person can set."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -6,8 +6,6 @@ A corrected robot file says what it leaves by itself, and is no worse than the a
 The arm yields under a load at its tool. Its sag is worked out here from weight and lever.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The five tutorials as a beginner follows them: from an empty directory to a verdict."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

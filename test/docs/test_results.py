@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The results that are kept are small; of the others there is a command and a digest."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

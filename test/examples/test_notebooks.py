@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The notebooks run from top to bottom, show pictures, and say what they set out to show."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

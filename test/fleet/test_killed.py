@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A fleet run that is killed goes on: nothing finished is lost, and nothing is written twice."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pages of a fleet: the worst cell first, what changed, what is usual, in a real browser."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

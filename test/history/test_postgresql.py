@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The history on a real PostgreSQL server, beside the same on SQLite."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A history that many write to, that an older version made, that is damaged, or is none."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import shutil

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who imports whom, read from the source: at the top, inside functions, and for types alone."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable, Mapping
 from functools import cache

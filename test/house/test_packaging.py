@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One version, one description of each package, and no import that nothing asks for."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tree as a colcon workspace: built, then each executable started as `ros2 run` does."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the README promises exists and runs."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

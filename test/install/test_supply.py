@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is installed: the lock, the bill of materials, and a wheel that is the same every time."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

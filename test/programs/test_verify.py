@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured again after a correction: the laboratory's own controller and arm carry it out, or do not."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A server in a process of its own, and how somebody without a browser talks to it."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The directory of a server: what lies there and is not the server's stays as it is."""
 
-from __future__ import annotations
-
 import os
 import stat
 

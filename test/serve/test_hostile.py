@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The server under people who mean it ill, on a disk that fills up, with files that are not its own."""
 
-from __future__ import annotations
-
 import json
 import socket
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A conversation with the server in this process: every answer to it is as it was kept."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 from concurrent.futures import ThreadPoolExecutor

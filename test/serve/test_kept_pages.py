@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every page that the server makes, of every state of what was dropped, is as it was kept."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

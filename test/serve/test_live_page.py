@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live page beside running nodes: what they publish on /diagnosis is on it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The server as people use it: Chromium from drop to sheet, two users, a kill and a new start."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

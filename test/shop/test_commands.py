@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every command tells what it does on one screen, with an example; what few need, when asked."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two weeks of a shop in the shell: plan, fill in, import, diagnose, keep; what people add stays."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -7,8 +7,6 @@ The arm it works for has a zero of its elbow that is off; where its tool really 
 with that zero written into the robot file by hand.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

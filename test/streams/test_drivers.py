@@ -7,8 +7,6 @@ Each layout names the file that it was read from and the commit. Joints are publ
 quality of service of the driver; the oracle is the kinematics of the robot at the joints by name.
 """
 
-from __future__ import annotations
-
 import re
 import time
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The running twin and the twin over a bag say the same of the same messages."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -6,8 +6,6 @@ Running nodes beside trackers and controllers that publish other types, names an
 The others live in a participant of their own: real messages of `tf2_msgs` and `control_msgs`.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from functools import partial

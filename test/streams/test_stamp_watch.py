@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What stamps tell: gaps of a beat are counted, what is no beat is let be, jumps are no gaps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a recorder has heard of the nodes beside it, and what it has recorded."""
 
-from __future__ import annotations
-
 import json
 
 from weld_twin_msgs_py.bags import BagReader

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`import weld_twin_core as wt` shows what there is, quickly, and every example in it runs."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import importlib

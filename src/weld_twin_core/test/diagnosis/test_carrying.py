@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors that one motion shows alike, and another tells apart; and what is promised of another holds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Few stations: what is found in them has to be more than what is found in noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much farther off regions are than models say: against draws whose dispersion is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

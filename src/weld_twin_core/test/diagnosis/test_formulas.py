@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names whose formula does not hold: what no effect in the library does is not told as one."""
 
-from __future__ import annotations
-
 import numpy as np
 from small_arm import small_arm
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes that no effect stands for: where they are, what they depend on, and their curve."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

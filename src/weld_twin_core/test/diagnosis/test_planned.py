@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans of a measurement: what more stations, less noise and a wider region change."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intervals of shares, of causes that overlap and of causes that cancel each other in part."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_arm import small_arm

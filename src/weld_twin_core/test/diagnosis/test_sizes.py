@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How large small errors are, learned from an arm or from equations made by hand; and what data hide."""
 
-from __future__ import annotations
-
 import warnings
 from itertools import product
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constant errors that are one error on every motion are told as a set."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_arm import small_arm

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes between diagnoses, against years of simulated weekly recordings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots without a single zero, one or right angle in their geometry."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bulk kernels against the plain chain, which test_chain holds against Pinocchio."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from threading import Thread

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One turn in plain numbers, against scipy's rotations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

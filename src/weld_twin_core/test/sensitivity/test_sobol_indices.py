@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sobol and Morris against functions whose indices are known on paper, and against SALib."""
 
-from __future__ import annotations
-
 from importlib.metadata import version
 
 import numpy as np

@@ -7,8 +7,6 @@ Each way to spoil data is found, named, placed and undone; sound data raise noth
 kept in `kept/`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a seam cannot show of the frames stays as it was given; what it shows is fitted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

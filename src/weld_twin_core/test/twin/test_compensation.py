@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compensated commands, and constant errors written into the robot, against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was recorded, how a motion outside of it is told, and how little is corrected there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

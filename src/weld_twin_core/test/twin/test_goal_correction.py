@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals corrected whole or refused, judged on arms whose own numbers were changed by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

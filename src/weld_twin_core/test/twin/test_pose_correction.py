@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses corrected one after the other, judged on an arm whose own numbers were changed by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

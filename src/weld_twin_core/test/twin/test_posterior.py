@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Covariances of predicted poses: against draws of whole models, and by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where joints have just turned around, and what is left by models that are wrong or lack something."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

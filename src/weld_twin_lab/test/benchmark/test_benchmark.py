@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark: that contenders do the same job, and that pages show what was measured."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Truths and diagnoses written by hand."""
 
-from __future__ import annotations
-
 
 def truth(kind='single', causes=(), *, name='case_0001', ratios=None, alike=(), **more):
     """Return a truth about causes, each an entry of an effects file."""

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole check, small: made, diagnosed, scored, from the command line."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

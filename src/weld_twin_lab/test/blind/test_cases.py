@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is drawn: shares, strata, determinism; and how large causes are, against hand values."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import fields
 

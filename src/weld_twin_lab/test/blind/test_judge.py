@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Verdicts held against truths, with the answers worked out by hand."""
 
-from __future__ import annotations
-
 import pytest
 from blind_verdicts import diagnosis, offset, truth
 

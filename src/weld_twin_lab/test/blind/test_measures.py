@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures against counts made by hand, intervals and calibration against scipy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from blind_verdicts import diagnosis, offset, truth

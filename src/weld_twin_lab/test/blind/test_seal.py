@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is sealed stays as it was, or is found out; what is to be blind is kept blind."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import stat

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Seams drawn at random: one that passes near a singular posture is drawn again, not planned."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from weld_twin_core.arm import catalog

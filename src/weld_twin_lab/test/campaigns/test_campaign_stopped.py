@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A campaign that is told to end takes the nodes it started with it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

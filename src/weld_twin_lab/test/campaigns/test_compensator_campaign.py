@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the campaign of the compensator counts and judges, on goals whose answer is known."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings that hardly say anything are diagnosed, or refused in a sentence, never a traceback."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Broken and malicious files give a result or one sentence; the campaign reads many more."""
 
-from __future__ import annotations
-
 import json
 import math
 import sqlite3

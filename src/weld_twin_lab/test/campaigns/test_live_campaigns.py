@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the campaigns with live nodes count and judge, on cases where the answer is known."""
 
-from __future__ import annotations
-
 import json
 import os
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the trial of security calls shown, and the trial itself where it can be made."""
 
-from __future__ import annotations
-
 import json
 from importlib.util import find_spec
 

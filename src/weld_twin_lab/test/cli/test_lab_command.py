@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`weld-twin lab` knows every proof, and the older ones answer there as they do alone."""
 
-from __future__ import annotations
-
 import pytest
 
 from weld_twin_lab.cli import lab

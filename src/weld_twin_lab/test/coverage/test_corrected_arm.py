@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm that is corrected keeps what the plan of its measurement promised."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

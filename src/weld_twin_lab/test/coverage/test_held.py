@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Regions are counted as a statistician would: against draws from the very covariance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Splits are what they say, nothing is judged on what it was fitted on; published data are read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.io import savemat

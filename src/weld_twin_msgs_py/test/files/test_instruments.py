@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How sure an instrument is, by its name or its certificate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Serialised messages read and written here, against the serialiser of rosbags."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of trackers that publish transforms and of controllers that publish states of their own."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a bag is said to hold, and which of its streams begins late or ends early."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint states under other names, and velocities that are none, as a running node takes them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

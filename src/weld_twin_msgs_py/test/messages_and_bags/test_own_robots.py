@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots as files: the bundled ones, and those that a user drops in a folder."""
 
-from __future__ import annotations
-
 import re
 from importlib.resources import files
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames that `/tf` tells of: ways between them, at any time, and ways there are none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

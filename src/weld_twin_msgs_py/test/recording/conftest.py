@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbered messages, and what a bag holds of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

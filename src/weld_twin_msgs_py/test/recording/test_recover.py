@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a recording that was cut short gives back."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of several files: written here and elsewhere, and a writer that never waits."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 import tracemalloc

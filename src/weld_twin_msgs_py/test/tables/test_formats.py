@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs of controllers and exports of instruments, a sample each of the documented form."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables as people and spreadsheets leave them: every one holds the same six stations."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables as spreadsheets, instruments and controllers leave them, of one arm with known joints."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`import`: tables made here from known angles, in the units and words of others."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

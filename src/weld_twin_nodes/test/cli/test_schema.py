@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`schema`: what the readers take, the schemas take, and what they refuse they refuse."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`simulate`, `info` and what every subcommand does with bad input, and with a robot in a folder."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

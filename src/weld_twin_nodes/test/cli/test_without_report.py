@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot's computer has no weld_twin_report: nodes and the commands that write no page do without."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot and a short seam."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node given nonsense warns, counts, publishes nothing wrong, and goes on."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

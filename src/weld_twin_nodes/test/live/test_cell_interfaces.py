@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The standard interfaces of a cell, over DDS."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline

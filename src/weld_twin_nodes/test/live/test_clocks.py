@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clocks that disagree: named by the analyzer, in words that hold the offset."""
 
-from __future__ import annotations
-
 import re
 import time
 

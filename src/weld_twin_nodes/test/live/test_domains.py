@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two cells of one machine never share a ROS domain, and none is put among somebody else's nodes."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

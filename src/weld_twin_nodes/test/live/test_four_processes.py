@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Four nodes in four processes over DDS, recorded, against the same run computed in bulk."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames of the cell: where the base is, in which frame measurements come, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node tells of its inputs, look by look."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

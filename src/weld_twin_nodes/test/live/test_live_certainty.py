@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How sure the live twin is, over DDS."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live node on streams with and without a gap."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

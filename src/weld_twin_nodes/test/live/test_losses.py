@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What goes missing between running nodes is counted and told, by processes that stand still."""
 
-from __future__ import annotations
-
 import signal
 import time
 

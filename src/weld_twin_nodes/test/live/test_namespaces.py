@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two robots on one domain, and topics under other names, over DDS."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import rclpy

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes fed from a played bag give what the bag recorded live, and begin anew when it loops."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

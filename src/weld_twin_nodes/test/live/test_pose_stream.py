@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """When a stream of poses is corrected, and that what is added changes at a standstill alone."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

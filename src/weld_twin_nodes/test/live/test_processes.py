@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes as programs: how they start, stop, die, and what the recorder keeps then."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starting nodes: what they take, what they refuse, and the launch files that start them."""
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A change that single measurements hide is noticed in their mean, and noise of any kind is none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One twin in its own process beside a controller that does what controllers do."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

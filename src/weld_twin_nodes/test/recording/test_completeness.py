@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording is whole, or says what is missing: on the terminal, in the bag, in its health."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

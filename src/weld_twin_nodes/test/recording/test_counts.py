@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What nodes tell of their messages, who is still to be met, and types nobody here knows."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorder and live diagnosis as managed nodes, driven by the standard services."""
 
-from __future__ import annotations
-
 import signal
 import time
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The security policy allows each node what it does, and nothing else."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

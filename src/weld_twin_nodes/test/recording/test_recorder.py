@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder as a program: killed, split, and on a disk that fills up."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of a seam that was welded twice says what was measured, and by which way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from weld_twin_report.demo.closed_loop import Seam, closed_loop_page

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`demo`: the whole job in one command, and what it leaves behind; nodes in the README's Python."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

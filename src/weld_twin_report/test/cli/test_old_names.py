@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The names that modules had in weld_twin_nodes go on for a release, and lead to the same modules."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib import import_module

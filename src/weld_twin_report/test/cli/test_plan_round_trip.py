@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `plan-measurement` says and writes; its table is read back for arms of every kind."""
 
-from __future__ import annotations
-
 import csv
 import re
 

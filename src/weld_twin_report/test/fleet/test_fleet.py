@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A list of recordings into a database: good ones, bad ones, and once each."""
 
-from __future__ import annotations
-
 import shutil
 import sqlite3
 from pathlib import Path

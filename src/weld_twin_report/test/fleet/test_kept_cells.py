@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pages of a fleet, and what commands say of its cells, are as they were kept."""
 
-from __future__ import annotations
-
 from datetime import datetime, timedelta, timezone
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands in processes of their own: what goes wrong in one is told, and harms no other."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

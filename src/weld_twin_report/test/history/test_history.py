@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cell's history: diagnoses in, what changed out, in a real database."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys

@@ -7,8 +7,6 @@ A motion with known errors is simulated, predicted, corrected and exported by a 
 written by hand, so that no diagnosis is asked.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import re

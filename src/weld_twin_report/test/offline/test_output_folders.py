@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What commands do to folders in which a person has put, or changed, something."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

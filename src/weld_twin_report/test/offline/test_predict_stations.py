@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`predict` on stations at rest, recorded by others: joint states now and then, and little else."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """diagnose, predict, export and compensate on a small simulated cell, from files to files."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

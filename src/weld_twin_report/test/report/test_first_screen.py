@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first screen answers what a fitter asks first, without what misled one; no word is broken."""
 
-from __future__ import annotations
-
 import diagnoses
 import pytest
 from rich.console import Console

@@ -6,8 +6,6 @@ Whole sheets are as they were kept: six in full, of others what differs from one
 The name of a case is what its sheet was read for; in `kept/` the words that answer it stand.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page as a browser has it: no script errors, nothing fetched, readable at any width."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the report says in words and numbers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from io import StringIO
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sheet in a real browser: switches, cursors, tolerance; readable on a phone, dark, in print."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data and set-up that are wrong: what diagnose says, leaves behind and mends."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the sheet says holds together: one figure for one thing, and what is not known is said."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

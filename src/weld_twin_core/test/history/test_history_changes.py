@@ -93,16 +93,6 @@ def test_a_trend_is_no_step_and_has_its_rate():
     assert found[0].day == pytest.approx(7.0 * 20, abs=21.0)
 
 
-def test_what_may_have_come_slowly_is_told_so():
-    def worn(week):
-        return 0.012 * (np.arange(COUNT) == 5) * max(week - 20, 0)
-
-    slow, sudden = changes(year(3, worn)), changes(year(3, only(5, 1.0, 30)))
-    assert [each.name for each in (*slow, *sudden)] == [NAMES[5], NAMES[5]]
-    assert slow[0].kind == 'trend' or slow[0].since <= 7.0 * 20
-    assert (sudden[0].kind, sudden[0].since) == ('step', None)
-
-
 def test_a_season_is_neither():
     def swing(week):
         return 0.6 * (np.arange(COUNT) == 2) * np.sin(2.0 * np.pi * week * 7.0 / 365.25 + 0.4)

@@ -180,11 +180,3 @@ def test_the_gravity_torque_of_the_iiwa_is_the_slope_of_the_energy_of_its_urdf(c
         moves = step * np.eye(robot.n)
         slope = [(energy(q + move) - energy(q - move)) / (2.0 * step) for move in moves]
         np.testing.assert_allclose(gravity_torque(robot, q), -np.array(slope), atol=1e-6)
-
-
-def test_the_kuka_stands_upright_at_its_cannon_position():
-    # A2 = -90, A3 = 90 degrees: x = 25 + 420 + 80 mm, z = 400 + 455 + 35 mm.
-    q = np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
-    pose = forward(catalog.load('kuka_kr6_r900'), q)
-    np.testing.assert_allclose(pose[:3, 3], [0.525, 0.0, 0.89], atol=1e-12)
-    np.testing.assert_allclose(pose[:3, 2], [1.0, 0.0, 0.0], atol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.motion.inverse import following, solve_path
+from weld_twin_core.motion.inverse import solve_path
 from weld_twin_core.motion.inverse.following import follow
 from weld_twin_core.motion.paths import Polyline, Torch
 
@@ -75,9 +75,3 @@ def test_a_wrist_that_comes_by_its_singularity_is_not_followed():
     poses = forward(robot, q)
     assert follow(robot, poses, q[0]) is None
     np.testing.assert_allclose(solve_path(robot, poses, q[0]).q[:-1], q[:-1], atol=1e-6)
-
-
-def test_values_at_the_knots_determine_polynomials():
-    index, spread = following._knots(333)
-    values = np.polynomial.chebyshev.chebvander(np.linspace(-1.0, 1.0, 333), 15)
-    np.testing.assert_allclose(spread @ values[index], values, atol=1e-12)

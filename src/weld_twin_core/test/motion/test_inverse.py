@@ -15,7 +15,6 @@ from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.arm.rotation import angle_between
 from weld_twin_core.errors import ReachError
 from weld_twin_core.motion.inverse import family, polish, solve, solve_path
-from weld_twin_core.motion.inverse.closed_form import angle_to_distance, angle_to_height, turn
 from weld_twin_core.motion.inverse.continuity import jumps
 from weld_twin_core.motion.paths import Line, Torch
 
@@ -108,18 +107,6 @@ def test_a_seven_joint_arm_reaches_poses_made_within_its_limits(configurations):
         assert ((found >= robot.lower - 1e-9) & (found <= robot.upper + 1e-9)).all()
 
 
-def test_a_closed_angle_brings_the_vector_to_the_height_and_the_distance():
-    rng = np.random.default_rng(0)
-    along, start, offset = rng.normal(size=(3, 3))
-    axis = np.array([0.6, 0.0, 0.8])
-    reached = turn(axis, np.array(0.7), start)
-    for angle in angle_to_height(along, axis, start, along @ reached):
-        assert turn(axis, angle, start) @ along == pytest.approx(along @ reached)
-    length = np.linalg.norm(offset + reached)
-    for angle in angle_to_distance(offset, axis, start, length):
-        assert np.linalg.norm(offset + turn(axis, angle, start)) == pytest.approx(length)
-
-
 def test_polish_closes_a_rough_start_to_rounding(robot, configurations):
     q = configurations(robot, 50)
     q = q[np.linalg.cond(jacobian(robot, q)) < 100.0]
@@ -136,14 +123,6 @@ def test_a_path_keeps_the_branch_nearest_the_seed():
         solution = solve_path(robot, poses, seed)
         np.testing.assert_allclose(solution.q[0], seed, atol=1e-6)
         assert np.abs(np.diff(solution.q, axis=0)).max() < 0.1
-
-
-def test_a_seed_on_another_turn_is_followed_there():
-    robot = catalog.load('ur5')
-    poses = Torch().poses(Line([0.4, -0.1, 0.2], [0.4, 0.1, 0.2]).sample(np.linspace(0, 0.2, 50)))
-    seed = solve_path(robot, poses).q[0]
-    seed[5] += 2.0 * np.pi * (-1.0 if seed[5] > 0.0 else 1.0)
-    np.testing.assert_allclose(solve_path(robot, poses, seed).q[0], seed, atol=1e-6)
 
 
 def test_a_joint_that_passes_half_a_turn_goes_on_and_does_not_jump_back():

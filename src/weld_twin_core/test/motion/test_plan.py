@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.errors import PathError, ReachError
-from weld_twin_core.motion.paths import KINDS, Line, Torch, Weave, default_seam
+from weld_twin_core.errors import PathError
+from weld_twin_core.motion.paths import KINDS, Torch, Weave, default_seam
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.motion.profiles import Constant, Smooth
 
@@ -136,11 +136,6 @@ def test_a_leaning_torch_and_a_zigzag_are_followed():
     assert planned.report.residual < 1e-9
     wire = planned.poses[:, :3, 2]
     np.testing.assert_allclose((wire * planned.seam.tangent).sum(axis=1), np.sin(0.2), atol=1e-12)
-
-
-def test_a_seam_out_of_reach_is_refused():
-    with pytest.raises(ReachError, match='ur5 cannot reach sample 0 at'):
-        plan(catalog.load('ur5'), Line([2.0, 0.0, 0.2], [2.0, 0.1, 0.2]))
 
 
 def test_a_senseless_rate_is_refused():

@@ -15,7 +15,6 @@ from weld_twin_core.sensitivity import (
     default_tolerances,
     default_values,
     end_of_linearity,
-    expected_rms,
     planned_study,
     scenario_deviations,
     sweep,
@@ -76,15 +75,6 @@ def test_time_laws_do_not_matter_to_pure_geometry(ur5):
     smooth, fast = compare_profiles(ur5, path, lagging, profiles=('smooth', 'aggressive'))
     assert fast.expected_m > 2.0 * smooth.expected_m
     assert fast.duration_s < smooth.duration_s
-
-
-def test_expected_deviation_of_a_turning_base_is_its_lever_arm(study):
-    turn = [t for t in default_tolerances(study.robot, ('base_pose',)) if t.index == 2]
-    turn = [t for t in turn if t.parameter == 'rotvec']
-    lever = np.hypot(*study.nominal.position[:, :2].T)
-    found = expected_rms(study, turn)
-    std = turn[0].distribution.std
-    assert lever.min() * std < found < lever.max() * std
 
 
 def test_advice_never_makes_it_worse_and_says_what_moved(ur5):

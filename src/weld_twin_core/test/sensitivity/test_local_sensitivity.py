@@ -89,17 +89,6 @@ def test_slope_of_play_equals_the_difference_where_the_motion_reverses(studies, 
     assert agree.mean() > 0.98
 
 
-def test_slope_of_a_link_length_is_one_and_of_an_offset_its_lever_arm(studies):
-    study = studies('ur5')
-    found = local_sensitivity(study, default_tolerances(study.robot, ('link_length',)))
-    np.testing.assert_allclose(found.analytic, 1.0, rtol=1e-12)
-    offset = local_sensitivity(study, default_tolerances(study.robot, ('joint_offset',)))
-    # The first axis of a UR5 is the world's z: the lever arm is the distance from it.
-    lever = np.hypot(*study.nominal.position[:, :2].T)
-    np.testing.assert_allclose(offset.analytic[0], lever, rtol=1e-12)
-    np.testing.assert_allclose(offset.turns, 1.0, rtol=1e-12)
-
-
 def test_weights_of_arc_length_do_not_follow_the_time_law(studies):
     smooth, aggressive = studies('ur5'), studies('ur5', 'aggressive')
     for study in (smooth, aggressive):

@@ -9,7 +9,7 @@ import yaml
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import increasing, readonly
 from weld_twin_core.effects import REGISTRY, effect_from_mapping, effects_from_list
-from weld_twin_core.errors import DataError, ModelError, TwinError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
 
@@ -210,13 +210,6 @@ def test_positions_in_degrees_are_recognised():
         "joint 'j0' is at 90 in sample 1, outside its limits [-3, 3]; this looks like degrees in "
         'a radian field'
     )
-
-
-def test_every_error_can_be_caught_as_one():
-    with pytest.raises(TwinError):
-        JointMotion([], [])
-    with pytest.raises(TwinError):
-        Robot.from_mapping({})
 
 
 def test_a_robot_survives_its_file(robot):

@@ -72,16 +72,6 @@ def test_geometric_errors_are_closed(robot):
     assert result.rms[0] > 1e-3
 
 
-def test_an_offset_is_compensated_by_its_opposite():
-    robot = load('ur5')
-    error = effects(robot, {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3})
-    recording = seam(robot)
-    result = compensate(robot, error, recording)
-    wanted = recording.joints.q - 2e-3 * np.eye(6)[2]
-    assert np.abs(result.motion.q - wanted).max() < 1e-9
-    assert np.abs(result.motion.qd - recording.joints.qd).max() < 1e-6
-
-
 def test_a_gear_error_is_compensated_in_position_and_speed():
     robot = load('ur5')
     gear = {'effect': 'gear_ratio', 'joint': 'shoulder_pan_joint', 'scale': 1e-3}

@@ -89,15 +89,6 @@ def test_wrench_torque_does_the_wrenchs_work(robot, textbook, frame):
         np.testing.assert_allclose(found[:, k], expected - weight, atol=1e-6)
 
 
-def test_a_horizontal_arm_feels_its_weight_times_its_reach(arm):
-    # The arm lies along -x; a positive turn of the shoulder about -y lowers what lies at -x.
-    out = [0.425 - 0.2125, 0.425 + 0.39225 - 0.15, *[0.425 + 0.39225] * 3]
-    mass = [8.393, 2.33, 1.219, 1.219, 0.1879]
-    torque = dynamics.gravity_torque(arm, np.zeros(6))
-    assert torque[1] == pytest.approx(9.80665 * np.dot(mass, out), abs=1e-9)
-    assert torque[0] == pytest.approx(0.0, abs=1e-12)
-
-
 def test_displaced_frames_give_the_torque_of_the_displaced_robot(robot, textbook):
     rng = np.random.default_rng(4)
     base, tool = 0.1 * rng.normal(size=6), 0.1 * rng.normal(size=6)

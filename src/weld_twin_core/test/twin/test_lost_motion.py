@@ -53,15 +53,6 @@ def test_hysteresis_solves_its_differential_equation(arm):
     np.testing.assert_allclose(found, expected, atol=1e-11)
 
 
-def test_a_wide_swing_closes_the_loop_and_a_small_one_hardly_opens_it(arm):
-    effect = Hysteresis('j2', amplitude=1e-3, travel=0.01)
-    wide = under(arm, effect, swung(np.r_[np.linspace(0, 0.5, 50), np.linspace(0.5, 0, 50)]))
-    assert wide[49] == pytest.approx(-1e-3, rel=1e-9)
-    assert wide[-1] == pytest.approx(1e-3, rel=1e-9)
-    small = under(arm, effect, swung(1e-4 * np.sin(np.arange(100.0))))
-    assert np.abs(small).max() < 0.03e-3
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=40), st.floats(1e-3, 1.0))
 def test_a_loop_stays_within_its_amplitude_and_does_not_care_how_finely_it_is_sampled(q, travel):
@@ -86,21 +77,6 @@ def test_friction_solves_its_differential_equation(arm):
         expected.append(-1e-3 * (both[0] - 0.3 * both[1]))
     effect = Friction('j2', windup=1e-3, asymmetry=-0.3, travel=0.02, release=0.08)
     np.testing.assert_allclose(under(arm, effect, swung(path)), expected, atol=1e-11)
-
-
-def test_friction_trails_by_its_wind_up_more_in_one_direction_and_lets_go_at_rest(arm):
-    path = np.cumsum(np.repeat([5e-3, -5e-3, 0.0], 100))
-    found = under(arm, Friction('j2', 1e-3, 0.25, release=0.1), swung(path))
-    np.testing.assert_allclose(found[[80, 180, 280]], [-1.25e-3, 0.75e-3, 0.0], atol=1e-5)
-
-
-def test_slow_motion_hardly_winds_up(arm):
-    fast, slow = (
-        under(arm, Friction('j2', 1e-3, travel=1e-3, release=0.1), swung(np.arange(300) * step))
-        for step in (1e-2, 1e-5)
-    )
-    assert fast[-1] == pytest.approx(-1e-3, rel=0.02)
-    assert slow[-1] == pytest.approx(-1e-3 / 11.0, rel=0.02)
 
 
 def test_a_fit_leaves_even_friction_even():
@@ -190,26 +166,6 @@ def moved(form, angles):
     return Twin(ROBOT, (effect,)).joints(motion)[:, 2] - angles
 
 
-def test_it_rests_half_a_gap_further_in_the_direction_it_came():
-    angles = np.array([0.0, 0.5, 1.0, 0.2, 0.9])
-    np.testing.assert_allclose(moved('coast', angles)[1:], [1e-4, 1e-4, -1e-4, 1e-4], atol=1e-15)
-
-
 def test_it_mirrors_play_while_the_gap_is_crossed():
     angles = np.cumsum(np.random.default_rng(1).normal(scale=1e-4, size=200))
     np.testing.assert_allclose(moved('coast', angles), -moved('play', angles), atol=1e-15)
-
-
-def test_the_derivative_by_width_is_that_of_differences():
-    angles = np.array([0.0, 0.5, 1.0, 0.2, 0.9])
-    q = np.zeros((5, 6))
-    q[:, 2] = angles
-    motion = Recording('r', JointMotion(np.arange(5.0), q, static=True))
-
-    def twin(width):
-        entry = {'effect': 'backlash', 'joint': JOINT, 'width': width, 'form': 'coast'}
-        return Twin(ROBOT, (effect_from_mapping(entry),))
-
-    _, slope = twin(2e-4).linearise(motion)
-    ends = [twin(w).poses(motion).position for w in (1.9e-4, 2.1e-4)]
-    np.testing.assert_allclose(slope[:, :3, 0], (ends[1] - ends[0]) / 2e-5, atol=1e-5)

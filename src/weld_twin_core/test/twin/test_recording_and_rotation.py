@@ -96,15 +96,6 @@ def test_a_pose_moved_by_what_is_missing_is_the_one_that_is_wanted():
     np.testing.assert_allclose(step[:, :3], wanted[:, :3, 3] - real[:, :3, 3])
 
 
-def test_quaternions_are_x_y_z_w_and_turn_back():
-    quarter = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
-    matrix = rotation.matrix_from_quaternion(quarter)
-    np.testing.assert_allclose(matrix @ [1, 0, 0], [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(rotation.quaternion_from_matrix(matrix), quarter)
-    negative = rotation.matrix_from_quaternion(-np.array(quarter))
-    assert rotation.quaternion_from_matrix(negative)[3] > 0.0
-
-
 def test_rotations_are_batched_even_when_there_are_none():
     for lead in ((), (0,), (2, 3)):
         matrix = rotation.rotation_matrix(np.zeros((*lead, 3)))

@@ -107,11 +107,12 @@ def test_derivative_by_every_parameter_alone(name, build, make_recording, stamps
     assert excess <= 1.0, name
 
 
-def test_derivative_of_a_lag_that_swings(robot, make_recording, stamps):
+@pytest.mark.parametrize(
+    'other', [effect('servo_lag', damping=0.4), effect('backlash', form='coast')]
+)
+def test_derivative_of_other_forms(other, robot, make_recording, stamps):
     recording = make_recording(robot)
-    excess, name = worst(
-        robot, [effect('servo_lag', damping=0.4)], recording, stamps(recording), 1e-5
-    )
+    excess, name = worst(robot, [other], recording, stamps(recording), 1e-5)
     assert excess <= 1.0, name
 
 

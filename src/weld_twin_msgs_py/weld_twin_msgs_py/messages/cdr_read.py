@@ -195,10 +195,6 @@ def _pose(v: tuple[float, ...]) -> Pose:
     return Pose(Xyz(*v[:3]), Xyzw(*v[3:7]))
 
 
-def _transforms(c: _Cursor) -> TFMessage:
-    return TFMessage(tuple(_transform(c) for _ in range(c.count(64))))
-
-
 def _transform(c: _Cursor) -> TransformStamped:
     header, child, v = c.header(), c.string(), c.doubles(7)
     return TransformStamped(header, child, Transform(Xyz(*v[:3]), Xyzw(*v[3:])))
@@ -234,7 +230,9 @@ READERS: dict[str, Callable[[_Cursor], Any]] = {
     'geometry_msgs/msg/TransformStamped': _transform,
     'trajectory_msgs/msg/JointTrajectory': _trajectory,
     'nav_msgs/msg/Path': _path,
-    'tf2_msgs/msg/TFMessage': _transforms,
+    'tf2_msgs/msg/TFMessage': lambda c: TFMessage(
+        tuple(_transform(c) for _ in range(c.count(64)))
+    ),
     'std_msgs/msg/String': lambda c: String(c.string()),
 }
 

@@ -199,8 +199,3 @@ def read_sources(sources: Sequence[Source], context: Context, name: str) -> Prog
     program = LANGUAGES[name].reader(sources, context).read()
     program.language = name
     return program
-
-
-def pose_notation(name: str) -> Notation:
-    """Return how a language writes a pose."""
-    return LANGUAGES[name].pose

@@ -90,7 +90,8 @@ def joint_units(
     """Return the units of the columns without one of their own."""
     turning, sliding = ~robot.prismatic, robot.prismatic
     units = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
-    usual = Units(units[0] or _usual_angle(q[:, turning]), units[1] or _usual_slide(q, robot))
+    angle = 'deg' if largest(q[:, turning]) > _TURN else 'rad'
+    usual = Units(units[0] or angle, units[1] or _usual_slide(q, robot))
     chosen = usual
     if judge is not None and len(q) >= ENOUGH:
         open_angle = units[0] is None and bool(turning.any())
@@ -147,10 +148,6 @@ def _given_unit(names: Sequence[str], kind: Sequence[bool], given: str | None) -
     """Return the unit that an option or the header gives one of some columns."""
     own = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
     return given or next((unit for unit in own if unit), None)
-
-
-def _usual_angle(values: Array) -> str:
-    return 'deg' if largest(values) > _TURN else 'rad'
 
 
 def _usual_slide(q: Array, robot: Robot) -> str:

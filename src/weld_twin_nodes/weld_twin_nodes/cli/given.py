@@ -251,9 +251,9 @@ SHORTEST = 1e-3
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:
     import numpy as np
 
-    from weld_twin_msgs_py.programs.languages import pose_notation
+    from weld_twin_msgs_py.programs.languages import LANGUAGES
 
-    notation = pose_notation(language)
+    notation = LANGUAGES[language].pose
     count = len(notation.name.split())
     out = {}
     for text in given:

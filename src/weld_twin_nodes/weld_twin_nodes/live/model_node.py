@@ -61,7 +61,8 @@ class ModelNode(CellNode):
             self.publish(sample)
 
     def intakes(self) -> Sequence[Intake]:
-        self._input.others = self.stream.passed_over
+        joints = self.stream.intake.joints
+        self._input.others = joints.others + joints.parts
         return (self.stream.intake,)
 
     @abstractmethod

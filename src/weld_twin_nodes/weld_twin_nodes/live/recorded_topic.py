@@ -24,7 +24,7 @@ from weld_twin_msgs_py.messages.typestore import TYPES, types_with
 
 from .cell_node import CellNode
 from .health import header_stamp
-from .source import LEAST, Wanted, full_names
+from .source import LEAST, Wanted
 from .words import Sent
 
 RULE = '=' * 80
@@ -170,10 +170,6 @@ class RecordedTopic:
         if not self._stamped or self._first is None or self._last is None:
             return Sent(count)
         return Sent(count, header_stamp(self._first), header_stamp(self._last))
-
-    def publishing_nodes(self) -> set[str]:
-        """Return the full names of the nodes that publish it."""
-        return full_names(self.source.publishers())
 
     def _take(self, kind: str, data: bytes) -> None:
         self._state.arrived()

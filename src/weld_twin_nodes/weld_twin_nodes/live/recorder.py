@@ -29,7 +29,7 @@ from .managed_node import ManagedNode
 from .recorded_topic import RecordedTopic, offered_channel
 from .run_node import run
 from .settings import Setting
-from .source import named
+from .source import full_names, named
 from .words import Sent
 
 _TEXT = decoder(ROBOT_DESCRIPTION.type)
@@ -168,7 +168,8 @@ class RecordingRun:
 
     def _meet(self) -> set[str]:
         """Return who publishes what is recorded, and take note of them."""
-        there = {name for topic in self._topics.values() for name in topic.publishing_nodes()}
+        sources = [topic.source for topic in self._topics.values()]
+        there = {name for source in sources for name in full_names(source.publishers())}
         self._publishers |= there
         for node in there:
             self._book.meet(node, time.monotonic())

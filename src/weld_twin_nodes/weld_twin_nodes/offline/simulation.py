@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core import __version__
-from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.poses import Poses
@@ -67,11 +66,6 @@ class Simulation:
         return Recording('simulation', motion, epoch_ns=int(self.stamps[0]))
 
     @cached_property
-    def actual_joints(self) -> Array:
-        """Return the joint positions with the joint-space effects, shape (N, n)."""
-        return self.real.joints(self.recording)
-
-    @cached_property
     def measured(self) -> Poses:
         """Return the measured tool poses, one for each joint state."""
         position, rotation = self.real.poses(self.recording)
@@ -107,7 +101,7 @@ class Simulation:
         )
         actual = (
             Entry(s, ACTUAL_JOINT_STATES.name, make.joint_state(s, names, q))
-            for s, q in zip(stamps, self.actual_joints, strict=True)
+            for s, q in zip(stamps, self.real.joints(self.recording), strict=True)
         )
         measured = _poses(make, MEASURED_POSE.name, _late(self.stamps, self.real), self.measured)
         expected = _poses(make, TWIN_POSE.name, _late(self.stamps, self.twin), self.expected)

@@ -112,11 +112,6 @@ class JointStream:
         """Return the robot with its effects."""
         return self._twin
 
-    @property
-    def passed_over(self) -> int:
-        """Return how many joint states made no sample of their own and were not refused."""
-        return self.intake.joints.others + self.intake.joints.parts
-
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._twin = self._live.twin = twin

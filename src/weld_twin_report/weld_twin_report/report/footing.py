@@ -99,7 +99,8 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     entries = [
         (key.replace('_', ' ').capitalize(), _plain(value))
         for key, value in rest.items()
-        if value not in (None, '') and not _is_bulk(value)
+        # Lists of numbers belong into a file and not onto a page.
+        if value not in (None, '') and not (isinstance(value, list) and len(value) > 12)
     ]
     return joined([*parts, pairs(entries) if entries else None])
 
@@ -139,11 +140,6 @@ def _left_open(answer: Answer, wanted: dict[str, Any]) -> list[Html]:
     return [
         tag('p.note', words.format(names)) for group, names in sets if not made_for(wanted, group)
     ]
-
-
-def _is_bulk(value: Any) -> bool:
-    """Tell lists of numbers, which belong into a file and not onto a page."""
-    return isinstance(value, list) and len(value) > 12
 
 
 def _plain(value: Any) -> str:

@@ -71,7 +71,7 @@ class Directory:
                 names = [FILE]
             if FILE in names:
                 yield folder
-            elif all(_cut_off(name) for name in names):
+            elif all(name in (UPLOADS, MODEL) or FILE in name for name in names):  # cut off
                 shutil.rmtree(folder, ignore_errors=True)
 
     def close(self) -> None:
@@ -120,11 +120,6 @@ class Directory:
         os.pwrite(self._lock_file, text.encode(), 0)
 
 
-def _cut_off(name: str) -> bool:
-    """Return whether a name is one of what an upload leaves that was cut off."""
-    return name in (UPLOADS, MODEL) or FILE in name
-
-
 def _of(lock: int) -> str:
     """Return which process holds a mark."""
     with suppress(ValueError, LookupError, TypeError):
@@ -152,12 +147,9 @@ def is_full(error: BaseException) -> bool:
 
 def refuse_full(directory: Path, length: int) -> None:
     """Refuse an upload that the disk has no room for, by NoRoom."""
-    if shutil.disk_usage(directory).free < length + min(SPARE, _tenth(directory)):
+    disk = shutil.disk_usage(directory)
+    if disk.free < length + min(SPARE, disk.total // SHARES):
         raise NoRoom(NO_ROOM)
-
-
-def _tenth(directory: Path) -> int:
-    return shutil.disk_usage(directory).total // SHARES
 
 
 def size_of(folder: Path) -> int:

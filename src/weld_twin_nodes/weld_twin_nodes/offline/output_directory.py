@@ -15,9 +15,10 @@ import fcntl
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -132,7 +133,7 @@ def decide(scratch: Path, change: Change) -> None:
     write_text(scratch / NOTE, json.dumps(asdict(change)) + '\n')
 
 
-def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -> None:
+def carry_out(folder: Path, scratch: Path) -> None:
     """Do what the note of a scratch directory says and is not done; tell what was kept."""
     try:
         change = _decided(scratch / NOTE)
@@ -145,7 +146,7 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
             continue  # moved before the one who began was killed, or not what was made
         foreign = _foreign(folder, name, ours, new)
         if foreign is not None:
-            kept(foreign, _keep(folder, foreign))
+            _keep(folder, foreign)
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(made / name, folder / name)
     for name, ours in change.drop.items():
@@ -155,9 +156,9 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
         if foreign is None:
             _drop(folder, name)
         else:
-            kept(foreign, _keep(folder, foreign))
+            _keep(folder, foreign)
     if _is_no_list(folder):
-        kept(LIST, _keep(folder, LIST))
+        _keep(folder, LIST)
     write_list(scratch, {**listed(folder), change.mark: change.listed})
     os.replace(scratch / LIST, folder / LIST)
 
@@ -227,11 +228,11 @@ def _blocking(folder: Path, name: str) -> str | None:
     return name if (folder / name).is_dir() else None
 
 
-def _keep(folder: Path, name: str) -> str:
-    """Give a file that is not ours another name, and return it."""
+def _keep(folder: Path, name: str) -> None:
+    """Give a file that is not ours another name, and tell it."""
     new = _kept_name(folder, name)
     os.rename(folder / name, folder / new)
-    return new
+    print(f"weld-twin: '{name}' was not overwritten and is kept as '{new}'", file=sys.stderr)
 
 
 def _kept_name(folder: Path, name: str) -> str:
@@ -259,11 +260,6 @@ INSIDE = '.weld_twin-'
 """Prefix of scratch directories in a folder that is there already."""
 
 
-def on_stderr(text: str) -> None:
-    """Tell a line on stderr."""
-    print(f'weld-twin: {text}', file=sys.stderr)
-
-
 @contextmanager
 def new_directory(
     path: Path | str,  # a folder, new or there already. A link is followed
@@ -273,7 +269,6 @@ def new_directory(
     adds: bool = False,  # files of the same result that are not made again stay, too
     # The folder may be anybody's; left out, one that holds other things alone is refused.
     shared: bool = False,
-    tell: Callable[[str], None] = on_stderr,  # called with which files got another name
 ) -> Iterator[Path]:
     """
     Yield a hidden directory whose files come to ``path`` when the block succeeds.
@@ -282,20 +277,24 @@ def new_directory(
     person has changed, and whatever else lies there, stays.
     """
     target = followed(path)
+    rescue = partial(_rescue, target)
     try:
-        _finish(target, tell)
+        # What killed runs left is swept, and what they had decided is done.
+        sweep(target.parent, f'.{_name(target)}-', rescue)
+        sweep(target, INSIDE, rescue)
         _refuse_foreign(target, mark, force or shared)
         if not (force or shared):
             _refuse_before(target, mark)
-        scratch = _scratch(target, tell)
+        place = (target, INSIDE) if target.is_dir() else (target.parent, f'.{_name(target)}-')
+        scratch = Scratch(*place, rescue)
     except OSError as error:
         raise _refusal(target, error) from None
-    with scratch as place:
-        made = place / MADE
+    with scratch as hidden:
+        made = hidden / MADE
         made.mkdir()
         yield made
         try:
-            _install(target, scratch, mark, force, adds, tell)
+            _install(target, scratch, mark, force, adds)
         except OSError as error:
             raise _refusal(target, error) from None
 
@@ -320,37 +319,15 @@ def _refusal(target: Path, error: OSError) -> DataError:
     return DataError(f"'{target}' cannot be written: {error.strerror or error}")
 
 
-def _scratch(target: Path, tell: Callable[[str], None]) -> Scratch:
-    rescue = _rescue(target, tell)
-    if target.is_dir():
-        return Scratch(target, INSIDE, rescue)
-    return Scratch(target.parent, f'.{_name(target)}-', rescue)
-
-
 def _name(target: Path) -> str:
     return Path(os.path.realpath(target)).name
 
 
-def _finish(target: Path, tell: Callable[[str], None]) -> None:
-    """Sweep what killed runs left, and end what they had decided."""
-    rescue = _rescue(target, tell)
-    sweep(target.parent, f'.{_name(target)}-', rescue)
-    sweep(target, INSIDE, rescue)
-
-
-def _rescue(target: Path, tell: Callable[[str], None]) -> Callable[[Path], None]:
-    """Return what ends a change that a killed run had decided, given its scratch directory."""
-
-    def rescue(scratch: Path) -> None:
-        if target.is_dir():
-            with _alone(target):
-                carry_out(target, scratch, _kept_notice(tell))
-
-    return rescue
-
-
-def _kept_notice(tell: Callable[[str], None]) -> Callable[[str, str], None]:
-    return lambda name, new: tell(f"'{name}' was not overwritten and is kept as '{new}'")
+def _rescue(target: Path, scratch: Path) -> None:
+    """End a change that a killed run had decided."""
+    if target.is_dir():
+        with _alone(target):
+            carry_out(target, scratch)
 
 
 @contextmanager
@@ -365,9 +342,7 @@ def _alone(folder: Path) -> Iterator[None]:
         os.close(lock)
 
 
-def _install(
-    target: Path, scratch: Scratch, mark: str, force: bool, adds: bool, tell: Callable[[str], None]
-) -> None:
+def _install(target: Path, scratch: Scratch, mark: str, force: bool, adds: bool) -> None:
     if not scratch.is_whole:
         raise DataError(f"'{target}' was deleted while it was being written; run it again")
     folder = scratch.path / MADE
@@ -385,7 +360,7 @@ def _install(
             refuse(target, mark, list(in_the_way(target, change)))
         decide(scratch.path, change)
         try:
-            carry_out(target, scratch.path, _kept_notice(tell))
+            carry_out(target, scratch.path)
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise

@@ -185,7 +185,7 @@ def test_where_folders_of_ours_should_be_a_persons_file_is_kept(tmp_path):
     (out / 'figures').write_text('a list of figures')
     (out / 'page.html').mkdir()
     (out / 'page.html/draft.txt').write_text('mine')
-    with new_directory(out, mark='result.json', force=True, tell=lambda text: None) as place:
+    with new_directory(out, mark='result.json', force=True) as place:
         write_text(place / 'figures/1.svg', '<svg/>')
         write_text(place / 'page.html', '<p/>')
         write_text(place / 'result.json', '{}')
@@ -198,16 +198,16 @@ def test_where_folders_of_ours_should_be_a_persons_file_is_kept(tmp_path):
     }
 
 
-def test_what_a_person_saves_while_the_command_runs_is_not_lost(tmp_path):
+def test_what_a_person_saves_while_the_command_runs_is_not_lost(tmp_path, capsys):
     out = tmp_path / 'out'
     make(out, **{'a.txt': '1'})
-    said = []
-    with new_directory(out, mark='result.json', force=True, tell=said.append) as place:
+    with new_directory(out, mark='result.json', force=True) as place:
         write_text(place / 'a.txt', '2')
         write_text(place / 'result.json', '{}')
         (out / 'a.txt').write_text('mine')
     assert (out / 'a.txt').read_text() == '2' and (out / 'a.kept-1.txt').read_text() == 'mine'
-    assert said == ["'a.txt' was not overwritten and is kept as 'a.kept-1.txt'"]
+    said = "weld-twin: 'a.txt' was not overwritten and is kept as 'a.kept-1.txt'\n"
+    assert capsys.readouterr().err == said
 
 
 def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(

@@ -122,7 +122,7 @@ def _causes(result: Verification) -> Html | None:
     shown: dict[str, Callable[[RemainingCause], str]] = {
         'Cause': _name,
         'Now': lambda cause: state(result, cause),
-        'RemainingCause of it': lambda cause: '' if cause.state == 'open' else _share(cause),
+        'Left of it': lambda cause: '' if cause.state == 'open' else _share(cause),
         'As it was it moves the tool by': lambda cause: millimetres(cause.rms_m),
     }
     lead = 'What is left was held against what each cause of the diagnosis does on this motion.'

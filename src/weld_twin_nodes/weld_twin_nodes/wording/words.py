@@ -100,7 +100,7 @@ def in_words(reason: str, sites: Iterable[Site]) -> str:
     for site in sorted(sites, key=lambda s: -len(str(s))):
         reason = reason.replace(str(site), site_name(site))
     reason = _NAME.sub(lambda m: called(m[0]) if m[0] in REGISTRY else m[0], reason)
-    return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
+    return f'{capital(reason).rstrip(".")}.'
 
 
 def unnamed(cause: Cause) -> bool:
@@ -116,6 +116,11 @@ def place_name(at: str) -> str:
 def parameter_word(name: str) -> str:
     """Return a parameter as a fitter says it."""
     return _PARAMETERS.get(name, name.replace('_', ' '))
+
+
+def capital(text: str) -> str:
+    """Return a text that begins with a capital letter."""
+    return f'{text[:1].upper()}{text[1:]}'
 
 
 def listed(names: Sequence[str], word: str = 'and') -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_nodes.wording.quantities import counted, millimetres, odds
+from weld_twin_nodes.wording.words import capital
 
 from ..history.database import Damaged, Database
 from ..history.entry import Entry
@@ -150,9 +151,8 @@ def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> H
         what = coordinate(name)
         before = int(np.searchsorted(seconds, begins[name])) if name in begins else None
         values = what.factor * np.array([_value(entry, name) for entry in entries])
-        title = what.words[:1].upper() + what.words[1:]
         axis = Axis('value', what.unit)
-        charts.append(control_chart(title, seconds, values, axis, before=before))
+        charts.append(control_chart(capital(what.words), seconds, values, axis, before=before))
     lead = (
         'Shaded is what is usual for this cell: three standard deviations of its own first '
         'diagnoses, before anything changed.'

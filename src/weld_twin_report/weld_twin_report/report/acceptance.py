@@ -15,19 +15,14 @@ from weld_twin_core.metrics.performance import Performance, performance_of
 from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets
 from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.switches import switches, trusted
-from weld_twin_nodes.wording.words import listed, unnamed
+from weld_twin_nodes.wording.words import capital, listed, unnamed
 
 from .html import Html, joined, section, table, tag
 from .page_data import at_rest, instant, worst
 from .performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .sections import Content, Demand, on_page
 
-WORDS = {
-    PASS: 'passes',
-    FAIL: 'fails',
-    OPEN: 'cannot be said',
-    None: 'no tolerance given',
-}
+WORDS = {PASS: 'passes', FAIL: 'fails', OPEN: 'cannot be said', None: 'no tolerance given'}
 _ROWS = 6
 """Poses of ISO 9283 on the page; `weld-twin iso9283` has all."""
 
@@ -65,7 +60,7 @@ def judgement(rule: Rule, size: float) -> str:
         high = rule.tolerance_m + rule.to_fail * rule.uncertainty_m
         passes = f'passes up to {millimetres(low)}' if low > 0.0 else 'nothing passes'
         words += f' ({passes}, fails above {millimetres(high)})'
-    return f'{words[:1].upper()}{words[1:]}'
+    return capital(words)
 
 
 def rule_data(rule: Rule) -> dict[str, Any]:
@@ -136,10 +131,8 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
         first = _row(f'as it is{_where(diagnosis)}', remaining.rms, remaining.largest, rule)
         if not diagnosis.effects:
             return [first]
-        return [
-            first,
-            _row('with what was found mended', remaining.rms_after, remaining.largest_after, rule),
-        ]
+        then = (remaining.rms_after, remaining.largest_after)
+        return [first, _row('with what was found mended', *then, rule)]
     out, taken = [], set(advised(diagnosis))
     for mended in switch_sets(diagnosis):
         remaining = remaining_with(diagnosis, mended)

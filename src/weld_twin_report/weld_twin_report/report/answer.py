@@ -49,14 +49,6 @@ _LINES = 3
 """Orders of ripple listed for each joint."""
 
 
-class Ripple(NamedTuple):
-    """The ripple of one joint: RMS of its amplitudes together [rad], and its strongest lines."""
-
-    joint: str
-    rms: float
-    lines: tuple[tuple[float, float], ...]  # order and amplitude [rad], strongest first
-
-
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
     """Return kind, what it accounts for, how much worse it is without, joints, what is like it."""
     rows = []
@@ -64,43 +56,27 @@ def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
         joints = [site.joint for site, _ in family.needed if site.joint] if family.named else []
         like = [site_name(site) for site, _ in family.like] if family.named else []
         name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
-        without = f'{100.0 * family.growth:+.0f} %'
-        cells = [
-            millimetres(family.rms_m),
-            without,
-            ', '.join(joints[:_LARGEST]),
-            ', '.join(like),
-        ]
-        rows.append([name, *cells])
+        cells = [millimetres(family.rms_m), f'{100.0 * family.growth:+.0f} %']
+        rows.append([name, *cells, ', '.join(joints[:_LARGEST]), ', '.join(like)])
     return rows
 
 
-def ripples(diagnosis: Diagnosis) -> list[Ripple]:
-    """Return the ripple of every joint that has any, in chain order."""
-    out = []
+def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
+    """Return joint, RMS of its ripple, strongest lines, in chain order."""
+    rows = []
     for effect in diagnosis.model.known + diagnosis.model.found:
         if isinstance(effect, TransmissionRipple):
             size = np.abs(np.atleast_1d(np.asarray(effect.amplitude)))
             order = np.broadcast_to(np.atleast_1d(np.asarray(effect.order)), size.shape)
-            first = np.argsort(-size)[:_LINES]
-            lines = tuple((float(order[k]), float(size[k])) for k in first)
-            out.append(Ripple(effect.joint, float(np.sqrt((size**2).sum() / 2.0)), lines))
-    return out
-
-
-def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return joint, RMS of its ripple, strongest lines."""
-    return [
-        [
-            r.joint,
-            f'{turned(r.rms)} ({1e6 * r.rms:.0f} µrad)',
-            ', '.join(
-                f'{order:g} ({turned(size)}, {1e6 * size:.0f} µrad)' for order, size in r.lines
-            ),
-        ]
-        for r in ripples(diagnosis)
-        if r.rms > 0.0
-    ]
+            rms = float(np.sqrt((size**2).sum() / 2.0))
+            lines = [
+                f'{order[k]:g} ({turned(size[k])}, {1e6 * size[k]:.0f} µrad)'
+                for k in np.argsort(-size)[:_LINES]
+            ]
+            if rms > 0.0:
+                text = f'{turned(rms)} ({1e6 * rms:.0f} µrad)'
+                rows.append([effect.joint, text, ', '.join(lines)])
+    return rows
 
 
 FAMILY_HEADS = ('Kind', 'Accounts for', 'Error without it', 'Needed at', 'Would do as well')
@@ -279,12 +255,9 @@ class Answer:
         whole = self.diagnosis
         if not whole.may_change or len(whole.recordings) < 2:
             return None
+        names = [recording.name for recording in whole.recordings]
         rows = [
-            [
-                whole.recordings[item.recording].name,
-                cause(item.effect.name, item.effect.site),
-                *row,
-            ]
+            [names[item.recording], cause(item.effect.name, item.effect.site), *row]
             for item in whole.changed
             for row in parameter_rows(item.effect, item.std, whole.model.robot)
         ]

@@ -28,6 +28,7 @@ from weld_twin_nodes.wording.switches import alternatives, as_it_is, cause_name,
 from weld_twin_nodes.wording.words import (
     CURVES,
     DEPENDENCES,
+    capital,
     cause,
     depending,
     leading,
@@ -70,8 +71,7 @@ class CauseAnswer:
 
     @cached_property
     def name(self) -> str:
-        heading = cause_name(self.diagnosis, self.cause)
-        return f'{heading[:1].upper()}{heading[1:]}'
+        return capital(cause_name(self.diagnosis, self.cause))
 
     @cached_property
     def effects(self) -> list[Effect]:
@@ -92,7 +92,7 @@ class CauseAnswer:
         kinds = [REGISTRY[name].traits for name in dict.fromkeys(names)]
         kinds = [traits for traits in kinds if traits.meaning]
         if len(kinds) < 2:
-            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in kinds]
+            return [f'{capital(each.meaning)}.' for each in kinds]
         return [f'{each.title}: {each.meaning}.' for each in kinds]
 
     @property
@@ -282,10 +282,8 @@ class CauseAnswer:
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), warned])
             steps = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
         if effects and self.alike:
-            return [
-                f'Which of them it is must be measured first. S{self._should_it_be}',
-                *steps,
-            ]
+            first = f'Which of them it is must be measured first. S{self._should_it_be}'
+            return [first, *steps]
         return steps
 
     @property

@@ -17,6 +17,7 @@ from .html import (
     document,
     figures,
     main,
+    said_section,
     section,
     sentences,
     table,
@@ -40,7 +41,7 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
         _left(entry),
         _outside(entry),
         _moves(entry),
-        _notes(entry),
+        said_section('What was assumed', entry['notes'], 'notes'),
         inputs_section(inputs),
     )
     return document(f'Corrected program · {title}', body)
@@ -90,11 +91,13 @@ def tolerance_sentences(entry: Mapping[str, Any]) -> list[str]:
 
 
 def _rms(accuracy: Mapping[str, Any]) -> str:
-    text = f'{accuracy["rms_m"] * 1e3:.3f} mm RMS'
-    if accuracy['rms_ci90_m'] is None:
-        return text
-    low, high = (value * 1e3 for value in accuracy['rms_ci90_m'])
-    return f'{text} ({low:.3f} to {high:.3f})'
+    text, ends = f'{accuracy["rms_m"] * 1e3:.3f} mm RMS', _ends(accuracy)
+    return f'{text} ({ends})' if ends else text
+
+
+def _ends(accuracy: Mapping[str, Any]) -> str:
+    ends = accuracy['rms_ci90_m']
+    return '' if ends is None else ' to '.join(f'{value * 1e3:.3f}' for value in ends)
 
 
 def _figures(entry: Mapping[str, Any]) -> Html:
@@ -103,21 +106,15 @@ def _figures(entry: Mapping[str, Any]) -> Html:
     for key, name in (('before', 'Before'), ('after', 'After')):
         value = entry['expected'][key]
         if value is not None:
-            worst = f'at worst {value["worst_m"] * 1e3:.3f} mm'
-            cells.append((name, f'{value["rms_m"] * 1e3:.3f} mm', _span(value) or worst))
+            ends, worst = _ends(value), f'at worst {value["worst_m"] * 1e3:.3f} mm'
+            span = f'in nine of ten cases {ends} mm' if ends else worst
+            cells.append((name, f'{value["rms_m"] * 1e3:.3f} mm', span))
     most = max((move['moved_m'] for move in moved), default=0.0)
     turn = max((move['turned_rad'] for move in moved), default=0.0)
     cells.append(
         ('Moved', f'{most * 1e3:.3f} mm', f'at most, and turned by {_degrees(turn)} at most')
     )
     return figures(cells)
-
-
-def _span(accuracy: Mapping[str, Any]) -> str:
-    if accuracy['rms_ci90_m'] is None:
-        return ''
-    low, high = (value * 1e3 for value in accuracy['rms_ci90_m'])
-    return f'in nine of ten cases {low:.3f} to {high:.3f} mm'
 
 
 def _first_run(entry: Mapping[str, Any]) -> Html:
@@ -193,10 +190,3 @@ def _millimetres(value: float | None) -> str:
 
 def _degrees(turn: float) -> str:
     return f'{turn * 57.29578:.3g}°'
-
-
-def _notes(entry: Mapping[str, Any]) -> Html | None:
-    if not entry['notes']:
-        return None
-    notes = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
-    return section('What was assumed', notes, id_='notes')

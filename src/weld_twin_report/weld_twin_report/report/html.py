@@ -10,6 +10,8 @@ from html import escape
 from importlib.resources import files
 from typing import Any, NamedTuple
 
+from weld_twin_nodes.wording.words import capital
+
 _EMPTY = frozenset({'br', 'meta', 'input'})
 
 
@@ -125,6 +127,12 @@ def pairs(rows: Iterable[tuple[str, Child]]) -> Html:
 def sentences(texts: Iterable[Child]) -> Html:
     """Return sentences below each other as a list."""
     return tag('ul.sentences', *(tag('li', text) for text in texts))
+
+
+def said_section(title: str, texts: Sequence[str], id_: str) -> Html | None:
+    """Return a section of sentences, which texts become; None without any."""
+    said = sentences(f'{capital(text)}.' for text in texts)
+    return section(title, said, id_=id_) if texts else None
 
 
 def lines(texts: Iterable[Child]) -> Html | None:

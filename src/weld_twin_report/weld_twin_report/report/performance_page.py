@@ -17,7 +17,7 @@ from weld_twin_nodes.wording.quantities import MISSING, millimetres, turned
 from .answer import recorded_at
 from .charts import Axis, Line, chart
 from .footing import inputs_section
-from .html import Figure, Html, document, figures, main, pairs, section, sentences, table
+from .html import Figure, Html, document, figures, main, pairs, said_section, section, table
 
 
 def performance_page(
@@ -36,8 +36,8 @@ def performance_page(
         _figures(result),
         _poses(result),
         None if result.path is None else _path(result.path),
-        _listed('What the standard asks for beyond this', result.lacking, 'lacking'),
-        _listed('How it was measured', [*notes, *recording.notes], 'notes'),
+        said_section('What the standard asks for beyond this', result.lacking, 'lacking'),
+        said_section('How it was measured', [*notes, *recording.notes], 'notes'),
         section('What the letters mean', pairs(MEANINGS), id_='meanings'),
         inputs_section(inputs),
     )
@@ -76,10 +76,7 @@ def _path(path: PathTest) -> Html:
     picture = chart(
         f'{length}, {cycles} cycles of {takes}',
         path.arc,
-        [
-            Line('accuracy', 1e3 * path.at, 'before'),
-            Line('repeatability', 1e3 * path.rt, 'after'),
-        ],
+        [Line('accuracy', 1e3 * path.at, 'before'), Line('repeatability', 1e3 * path.rt, 'after')],
         (Axis('along the path', 'm'), Axis('distance', 'mm')),
         from_zero=True,
     )
@@ -91,22 +88,9 @@ def _path(path: PathTest) -> Html:
     )
 
 
-def _listed(title: str, texts: Sequence[str], name: str) -> Html | None:
-    if not texts:
-        return None
-    return section(title, sentences(f'{t[:1].upper()}{t[1:]}.' for t in texts), id_=name)
-
-
 POSE_HEADS = (
-    'pose',
-    'at [mm]',
-    'cycles',
-    'AP [mm]',
-    'RP [mm]',
-    'AP [° (mrad)]',
-    'RP [° (mrad)]',
-    'vAP [mm]',
-    'drift [mm]',
+    *('pose', 'at [mm]', 'cycles', 'AP [mm]', 'RP [mm]', 'AP [° (mrad)]', 'RP [° (mrad)]'),
+    *('vAP [mm]', 'drift [mm]'),
 )
 PATH_HEADS = ('path', 'cycles', 'AT', 'RT', 'cycle takes')
 MEANINGS = (

@@ -19,6 +19,7 @@ from weld_twin_nodes.wording.mending import look_at, remaining_without, warning
 from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.verdict import in_order
 from weld_twin_nodes.wording.words import (
+    capital,
     cause,
     cause_by_site,
     effect_name,
@@ -250,7 +251,7 @@ def untried(diagnosis: Diagnosis) -> str:
         )
     if asked:
         verb = 'was' if len(not_to_be_tried(diagnosis)) == 1 else 'were'
-        words.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
+        words.append(f'{capital(asked)} {verb} not tried, as asked.')
     return ' '.join(words)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_core.effects.registry import REGISTRY
 from weld_twin_nodes.wording.quantities import millimetres
+from weld_twin_nodes.wording.words import capital
 
 from ..report.html import Html, bars, columns, document, joined, section, table, tag
 from .figures import Drawing
@@ -43,11 +44,9 @@ def study_page(
         parts.append(_claims(claims))
     if study is not None:
         parts.append(_setting(study['setting']))
-    title = (
-        'The claims of the paper'
-        if study is None
-        else (f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}')
-    )
+    title = 'The claims of the paper'
+    if study is not None:
+        title = f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}'
     foot = tag('p.note', f'weld_twin {__version__}')
     main = tag('main', tag('h1', title), *parts, foot)
     return document(title, main, allowed=_ALLOWED, style=_STYLE)
@@ -55,13 +54,8 @@ def study_page(
 
 def _study(study: dict[str, Any]) -> list[Html]:
     motions = study['motions']
-    first = next(iter(motions))
-    out = [
-        _answer(first, motions[first]),
-        _tighten(motions),
-        _stack(motions),
-        _local(motions[first]),
-    ]
+    name, first = next(iter(motions.items()))
+    out = [_answer(name, first), _tighten(motions), _stack(motions), _local(first)]
     if 'advice' in study:
         out.append(_advice(study['advice']))
     if study.get('recorded'):
@@ -96,16 +90,13 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
 
 
 def _first(advice: Advice) -> str:
-    text = advice.instruction
-    return (
-        f'{text[:1].upper()}{text[1:]} first: to {advice.wanted}, gains '
-        f'{millimetres(advice.gain_m)}.'
-    )
+    gain = millimetres(advice.gain_m)
+    return f'{capital(advice.instruction)} first: to {advice.wanted}, gains {gain}.'
 
 
 def _advised(rows: Sequence[Advice]) -> Html:
     shown = {
-        'What to do': lambda row: f'{row.instruction[:1].upper()}{row.instruction[1:]}',
+        'What to do': lambda row: capital(row.instruction),
         'tolerance now': lambda row: row.now,
         'to': lambda row: row.wanted,
         'gains': lambda row: millimetres(row.gain_m),

@@ -192,10 +192,7 @@ def run_all(
     for label, result in zip(owners, results[len(pieces) :], strict=True):
         parts[label].append(result)
     outcome = {
-        label: (
-            joined([unpacked(part['outcomes']) for part in own]),
-            own[0]['model_error'],
-        )
+        label: (joined([unpacked(part['outcomes']) for part in own]), own[0]['model_error'])
         for label, own in parts.items()
     }
     return outcome, results[: len(pieces)]
@@ -223,12 +220,9 @@ def run_study(
             'global': design.results(result),
         }
     if setting.path is not None:
-        out['advice'] = {
-            'profiles': pieces['', 'profiles'],
-            'placement': pieces['', 'placement'],
-        }
+        out['advice'] = {name: pieces['', name] for name in ('profiles', 'placement')}
     if RECORDED in setting.studies:
-        stacked = result[designs[RECORDED].stack_label][0]
+        stacked = result[designs[RECORDED].label('stack')][0]
         out['recorded'] = _recorded(setting, stacked)
     return out
 
@@ -239,11 +233,8 @@ def _pieces(setting: Setting) -> dict[tuple[str, str], Task]:
     tolerances = setting.tolerances
     if setting.path is not None:
         seam = setting.robot, setting.path, tolerances
-        tasks['', 'placement'] = Task(
-            placement,
-            (*seam, setting.torch, setting.effort.placements, setting.effort.seed),
-            'placement',
-        )
+        how = (setting.torch, setting.effort.placements, setting.effort.seed)
+        tasks['', 'placement'] = Task(placement, (*seam, *how), 'placement')
         tasks['', 'profiles'] = Task(profiles, seam, 'profiles')
     for name, study in setting.studies.items():
         tasks[name, 'local'] = Task(local, (study, tolerances), f'{name}: local')
@@ -271,12 +262,8 @@ class _Designs:
         self._effects = tuple(dict.fromkeys(t.effect for t in tolerances))
         self._morris = MorrisDesign(names, effort.trajectories, effort.seed)
 
-    @property
-    def stack_label(self) -> str:
-        """Return the label of the runs of the tolerance stack."""
-        return self._label('stack')
-
-    def _label(self, what: str) -> str:
+    def label(self, what: str) -> str:
+        """Return the label of some of the runs."""
         return f'{self._motion}: {what}'
 
     def jobs(self, study: Study) -> dict[str, Job]:
@@ -289,25 +276,24 @@ class _Designs:
             'stack': stack,
         }
         out: dict[str, Job] = {
-            self._label(what): (study, tolerances, design, None)
-            for what, design in designs.items()
+            self.label(what): (study, tolerances, design, None) for what, design in designs.items()
         }
         for effect in self._effects:
             halved = sensitivity.scaled(tolerances, {effect: 0.5})
-            out[self._label(f'{effect} halved')] = study, tolerances, stack, halved
+            out[self.label(f'{effect} halved')] = study, tolerances, stack, halved
         return out
 
     def results(self, result: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:
         """Return indices, measures and percentiles."""
         sobol = {
-            by: _indices(design, result[self._label(f'Sobol by {by}')][0])
+            by: _indices(design, result[self.label(f'Sobol by {by}')][0])
             for by, design in self._sobol.items()
         }
-        screened = self._morris.screening(result[self._label('Morris')][0].d_norm)
-        stacked, error = result[self.stack_label]
+        screened = self._morris.screening(result[self.label('Morris')][0].d_norm)
+        stacked, error = result[self.label('stack')]
         stack = self._stack(stacked)
         halved = {
-            effect: self._stack(result[self._label(f'{effect} halved')][0]).as_dict()
+            effect: self._stack(result[self.label(f'{effect} halved')][0]).as_dict()
             for effect in self._effects
         }
         return {

@@ -22,6 +22,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from weld_twin_core.errors import DataError, TwinError
+from weld_twin_nodes.wording.words import capital
 
 from ..fleet.cell_page import page_of
 from ..fleet.ranking_page import ranking_page
@@ -283,7 +284,7 @@ class _Site:
             return self._message('busy', text, 503)
         if isinstance(error, NoRoom) or is_full(error):
             text = str(error) if isinstance(error, NoRoom) else NO_ROOM
-            return self._message('no room', f'{text[:1].upper()}{text[1:]}.', FULL)
+            return self._message('no room', f'{capital(text)}.', FULL)
         if isinstance(error, TwinError):
             return self._asked_anew(request, str(error))
         status = getattr(error, 'status_code', 500)

@@ -83,13 +83,6 @@ def test_bases_that_are_fitted_are_compared(robot):
     assert only.effect.xyz == pytest.approx((2e-3, 0.0, 1e-3), abs=1e-4)
 
 
-def test_the_third_recording_alone(robot):
-    """What changed is put to the recording that has it."""
-    days = [day(robot, 1), day(robot, 2), day(robot, 3, JointOffset('wrist_1_joint', -8e-4))]
-    (only,) = seen(robot, days, ALL)
-    assert (only.recording, only.effect.site) == (2, 'wrist_1_joint')
-
-
 def test_what_cannot_be_told_is_listed(robot):
     """A base that is fitted takes the place of the zero of the first joint."""
     problem, model = aligned([day(robot, 1), day(robot, 2)], robot, 'base', COMMON)

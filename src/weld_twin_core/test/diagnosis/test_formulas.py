@@ -68,11 +68,6 @@ def test_an_instrument_that_errs_by_a_law_of_its_own_is_no_scale():
     assert any('measurement_scale' in reason for reason in found.reasons)
 
 
-def test_an_instrument_with_a_wrong_unit_is_told_by_its_name():
-    found = wt.diagnose(recorded(instrument=lambda p: 1.0001 * p), small_arm(), experiment=False)
-    assert [named.effect.name for named in found.effects] == ['measurement_scale']
-
-
 def test_lost_motion_of_another_law_is_placed_and_not_named():
     found = wt.diagnose(recorded(jumping), small_arm(), experiment=False)
     assert found.status == 'unknown'

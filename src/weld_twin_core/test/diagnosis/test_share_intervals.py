@@ -68,14 +68,6 @@ def test_the_intervals_of_causes_that_overlap_hold_their_true_shares(overlapping
         assert 0.001 < high - low < 0.1
 
 
-def test_the_shares_that_other_noise_would_have_given_lie_in_the_intervals(overlapping):
-    effects, answer, _ = overlapping
-    other, _ = solved(effects, seed=6)
-    for cause in other.causes:
-        low, high = intervals(answer)[cause.name[0][0].effect]
-        assert low < cause.share < high
-
-
 def test_a_cause_that_works_against_the_others_has_a_share_of_none():
     effects = [
         wt.effects.JointOffset(SHOULDER, offset=1e-3),

@@ -31,15 +31,7 @@ POINTWISE = tuple(
 )
 
 # Arms that differ in kind; more of a kind would only repeat them.
-BUILDS = (
-    'ur5',
-    'ur10',
-    'kuka_kr6_r900',
-    'abb_irb120',
-    'abb_irb1600',
-    'fanuc_m10ia',
-    'franka_panda',
-)
+BUILDS = ('ur5', 'kuka_kr6_r900', 'abb_irb120', 'franka_panda')
 
 
 @pytest.fixture(scope='module')

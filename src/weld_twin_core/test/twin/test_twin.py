@@ -120,7 +120,7 @@ DRAWN = usual()
 @pytest.mark.parametrize('name', DRAWN)
 def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, draws, make_recording, stamps):
     """Compare draws of an effect that are taken together with one after the other."""
-    recording, one = make_recording(robot), effect(name, **DRAWN[name])
+    recording, one = make_recording(robot, 25), effect(name, **DRAWN[name])
     values = one.vector() * np.linspace(0.4, 1.0, draws)[:, None]
     drawn = one.with_vector(values)
     np.testing.assert_array_equal(drawn.vector(), values)
@@ -166,13 +166,13 @@ def test_draws_that_do_not_fit_together_are_refused(arm):
         Twin(arm, (first, second))
 
 
-def test_order_of_effects_does_not_matter_across_stages(robot, make_recording, stamps):
-    recording = make_recording(robot)
+def test_order_of_effects_does_not_matter_across_stages(build, make_recording, stamps):
+    recording = make_recording(build)
     effects = [e for e in everything() if e.name != 'backlash']
     at = stamps(recording)
-    forth = Twin(robot, tuple(effects)).poses(recording, at)
+    forth = Twin(build, tuple(effects)).poses(recording, at)
     last_stage_first = sorted(effects, key=lambda e: -e.stage)
-    back = Twin(robot, tuple(last_stage_first)).poses(recording, at)
+    back = Twin(build, tuple(last_stage_first)).poses(recording, at)
     np.testing.assert_allclose(forth.position, back.position, atol=1e-15)
 
 

@@ -116,12 +116,12 @@ def test_derivative_of_other_forms(other, robot, make_recording, stamps):
     assert excess <= 1.0, name
 
 
-def test_derivatives_of_effects_together_are_exact(robot, make_recording, stamps):
-    recording = make_recording(robot)
+def test_derivatives_of_effects_together_are_exact(build, make_recording, stamps):
+    recording = make_recording(build)
     # The delay sees all other joint motion through its velocity.
     effects = [effect(name) for name in SEPARATE if name != 'thermal_growth']
     excess, name = worst(
-        robot, [*effects, effect('time_delay')], recording, stamps(recording), 2e-5
+        build, [*effects, effect('time_delay')], recording, stamps(recording), 2e-5
     )
     assert excess <= 1.0, name
 
@@ -143,14 +143,14 @@ def smaller(chosen, share):
 
 
 def test_all_effects_together_are_off_by_products_of_small_displacements_only(
-    robot, make_recording, stamps
+    build, make_recording, stamps
 ):
     """What is left out of a derivative is as large as the other effects are, and shrinks with them."""
-    recording = make_recording(robot)
+    recording = make_recording(build)
     effects = [effect(name) for name in ENTRIES if name not in FLANKS]
     (half, name), (eighth, _) = (
         worst(
-            robot, [smaller(e, share) for e in effects], recording, stamps(recording), 5e-3, 2e-7
+            build, [smaller(e, share) for e in effects], recording, stamps(recording), 5e-3, 2e-7
         )
         for share in (0.5, 0.125)
     )

@@ -27,10 +27,10 @@ def storage(request):
 
 @pytest.fixture
 def messages(tmp_path, recording, robot):
-    """Topic, type, time and bytes of the first second of a usual bag."""
+    """Topic, type, time and bytes of the first half second of a usual bag."""
     write_recording(tmp_path / 'usual', recording, robot)
     with BagReader(tmp_path / 'usual') as bag:
-        return list(bag.raw(bag.topics))[:250]
+        return list(bag.raw(bag.topics))[:100]
 
 
 def write(path, messages, storage):

@@ -113,11 +113,7 @@ def kept_of_engine(folder: Path) -> Path:
 
 
 def require_simulator() -> None:
-    """
-    Refuse to make cases without the simulator.
-
-    Raises DataError: it is not installed.
-    """
+    """Raise DataError where the simulator that cases are made with is not installed."""
     if find_spec('mujoco') is None:
         raise DataError(
             "cases are simulated with MuJoCo; install it with: pip install 'weld-twin[bench]'"
@@ -125,11 +121,7 @@ def require_simulator() -> None:
 
 
 def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) -> str:
-    """
-    Return rows as a table in Markdown.
-
-    columns: by the head of each, what it says of a row.
-    """
+    """Return rows as a table in Markdown, by the head of each column and what it says of a row."""
     cells = [[tell(row) for tell in columns.values()] for row in rows]
     return markdown.table(tuple(columns), *cells)
 

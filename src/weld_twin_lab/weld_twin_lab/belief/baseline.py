@@ -48,11 +48,7 @@ CURVES = frozenset({'joint_curve', 'frame_curve'})
 
 
 def brief(row: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return what is kept of a row: its truth and what was said, without the signs.
-
-    row: as `trial.tried` gives it of this mix.
-    """
+    """Return what is kept of a row of `trial.tried`: its truth and what was said, without the signs."""
     if row['error']:
         return {'name': row['name'], 'error': row['error']}
     truth, verdict = row['truth'], row['verdict']
@@ -115,11 +111,7 @@ class Scored(NamedTuple):
 
 
 def scored(row: Mapping[str, Any]) -> Scored:
-    """
-    Return a row held against its truth.
-
-    row: as `brief` gives it, without an error.
-    """
+    """Return a row of `brief` without an error, held against its truth."""
     truth, verdict = row['truth'], row['verdict']
     answer = whole(truth, verdict)
     model = {(e, j) for e, j in row['model']}
@@ -175,11 +167,7 @@ def _disowned(row: Mapping[str, Any], reported: Sequence[tuple[float, bool, bool
 
 
 def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
-    """
-    Return the measures of an engine, each with its interval.
-
-    rows: as `brief` gives them.
-    """
+    """Return the measures of an engine by rows of `brief`, each with its interval."""
     cases = [
         scored(row) for row in rows if not row['error'] and row['verdict']['status'] != 'unsound'
     ]
@@ -226,11 +214,7 @@ def _flat(parts: Any) -> list[bool]:
 
 
 def page(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """
-    Return one table of the measures, a column for every engine.
-
-    tables: by the name of the engine.
-    """
+    """Return one table of the measures, a column for every engine, by its name."""
     each = {name: scores(rows) for name, rows in tables.items()}
     first = next(iter(each.values()))
     body = [(key, *(str(own[key]) for own in each.values())) for key in first]
@@ -246,11 +230,7 @@ SAME = 1e-6
 
 
 def grown(seed: int, number: int) -> dict[str, Any]:
-    """
-    Return what is said of a cell with one recording, two, ..., and with all in reverse.
-
-    seed, number: of the cell, as `mix.drawn` takes them.
-    """
+    """Return what is said of a cell with one recording, two, ..., and with all in reverse."""
     name = f'{seed}/{number}'
     try:
         case = drawn(seed, number, SEVERAL).case
@@ -295,11 +275,7 @@ class GrowingStep(NamedTuple):
 
 
 def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
-    """
-    Yield every right cause that was sure, with what a recording more made of it.
-
-    row: as `grown` gives it, without an error.
-    """
+    """Yield every right cause of a row of `grown` that was sure, and what a recording more made of it."""
     truth = row['truth']
     for effect, joint in truth['sites']:
         alike = alike_by_structure(truth['robot'], (effect, joint))
@@ -320,11 +296,7 @@ def _believed(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float
 
 
 def apart(row: Mapping[str, Any]) -> float:
-    """
-    Return by how much probabilities differ where only the order does; 1 where names do.
-
-    row: as `grown` gives it, without an error.
-    """
+    """Return by how much probabilities differ where only the order does; 1 where names do."""
     one, other = (
         {
             (
@@ -341,11 +313,7 @@ def apart(row: Mapping[str, Any]) -> float:
 
 
 def growing_page(rows: Sequence[Mapping[str, Any]]) -> str:
-    """
-    Return the measures, and every sure cause that fell.
-
-    rows: as `grown` gives them.
-    """
+    """Return the measures of rows of `grown`, and every sure cause that fell."""
     good = [row for row in rows if not row['error']]
     every = [step for row in good for step in steps(row)]
     measures = {

@@ -44,11 +44,7 @@ class Example(NamedTuple):
 
 
 def kept(row: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return what is kept of a case: what its answer was worth, and every statement as an example.
-
-    row: as `trial.tried` gives it.
-    """
+    """Return what a row of `trial.tried` was worth, and every statement of it as an example."""
     if row['error'] or not row['statements']:
         return {key: row.get(key) for key in ('name', 'error', 'unsound')}
     truth, verdict = row['truth'], row['verdict']
@@ -112,11 +108,7 @@ def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str
 
 
 def _family(row: Mapping[str, Any], *, shared: bool = False) -> float:
-    """
-    Return the most that any cause believes of the family of the first cause at work.
-
-    shared: whether of a set only the members of that family count, and not the set as one name.
-    """
+    """Return the most that a cause believes of the first family at work; shared, not of a whole set."""
     if not row['truth']['sites']:
         return 0.0
     (family, _), *_ = row['truth']['sites']
@@ -168,11 +160,7 @@ def sets_hold(row: Mapping[str, Any]) -> bool:
 
 
 def examples_of(rows: Sequence[Mapping[str, Any]]) -> list[Example]:
-    """
-    Return every statement made on some cases.
-
-    rows: as `kept` gives them.
-    """
+    """Return every statement made on some cases, as `kept` gives them."""
     return [
         Example._make((str(row['name']), *one, float(row.get('weight', 1.0))))
         for row in rows

@@ -75,11 +75,7 @@ def fitted(
 
 
 def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array) -> float:
-    """
-    Return the mean log loss in nats.
-
-    probability, right, weight: shape (N,).
-    """
+    """Return the mean log loss in nats; all of shape (N,)."""
     clipped = np.clip(probability, 1e-4, 1.0 - 1e-4)
     loss = -np.where(np.asarray(right, dtype=bool), np.log(clipped), np.log(1.0 - clipped))
     return float((weight * loss).sum() / weight.sum())
@@ -110,13 +106,7 @@ ERROR = 0.1
 
 
 def bounded(probability: Array, right: Array, risk: float) -> Bound:
-    """
-    Return the lowest threshold at which one more case is sure and wrong too seldom to matter.
-
-    probability: of cases that took no part in the fit, shape (N,).
-    right: shape (N,).
-    risk: probability that a case may be sure and wrong.
-    """
+    """Return the lowest threshold at which one more case is sure and wrong with less than a risk."""
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
     best = NEVER
     for threshold in GRID:
@@ -128,13 +118,7 @@ def bounded(probability: Array, right: Array, risk: float) -> Bound:
 
 
 def precise(probability: Array, right: Array, risk: float) -> Bound:
-    """
-    Return the lowest threshold at which one more sure case is wrong too seldom to matter.
-
-    probability: of cases that took no part in the fit, shape (N,).
-    right: shape (N,).
-    risk: share of the sure cases that may be wrong.
-    """
+    """Return the lowest threshold at which one more sure case is wrong with less than a risk."""
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
     best = NEVER
     for threshold in GRID:
@@ -145,12 +129,7 @@ def precise(probability: Array, right: Array, risk: float) -> Bound:
 
 
 def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
-    """
-    Return what is known of a threshold.
-
-    probability: shape (N,).
-    right: shape (N,).
-    """
+    """Return what is known of a threshold on probabilities (N,)."""
     sure = probability >= threshold
     wrong, cases = int((sure & ~right).sum()), probability.size
     expected = (wrong + 1) / (cases + 1)
@@ -160,11 +139,7 @@ def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
 
 
 def upper_limit(wrong: int, cases: int, error: float) -> float:
-    """
-    Return the exact upper limit of a share.
-
-    error: probability that the share is larger.
-    """
+    """Return the exact upper limit of a share, which may be larger with the probability of the error."""
     if wrong >= cases:
         return 1.0
     return float(beta.ppf(1.0 - error, wrong + 1, cases - wrong))
@@ -261,11 +236,7 @@ def learned(
 
 
 def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Example]:
-    """
-    Return examples as they are reported by weights that had not seen their cases.
-
-    content: as `learned` returned it.
-    """
+    """Return examples as they are reported by weights that had not seen their cases."""
     examples, out = restated(examples), []
     for kind in TERMS:
         own = [e for e in examples if e.kind == kind]
@@ -345,11 +316,7 @@ def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
 
 
 def _parted(together: NDArray[np.str_]) -> Array:
-    """
-    Return the fold of every example in every partition, shape (PARTITIONS, N).
-
-    together: what each is unseen with, shape (N,).
-    """
+    """Return folds, (PARTITIONS, N), of examples that are unseen together with others, (N,)."""
     each, of = np.unique(together, return_inverse=True)
     orders = [np.random.default_rng(k).permutation(len(each)) for k in range(PARTITIONS)]
     return np.array([order[of] % FOLDS for order in orders])

@@ -56,11 +56,7 @@ class Levels(NamedTuple):
 
 
 def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
-    """
-    Return the right words for every cause of a case.
-
-    truth: as `making.truth_of` gives it; words that were kept with it hold.
-    """
+    """Return the right words for every cause of a truth of `making.truth_of`, or those kept with it."""
     if 'levels' in truth:
         return [Levels(frozenset(at), frozenset(on)) for at, on in truth['levels']]
     out = [_levels(str(effect), joint, str(truth['robot'])) for effect, joint in truth['sites']]
@@ -70,11 +66,7 @@ def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
 
 
 def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
-    """
-    Return the constant errors that are always the same error as one, itself included.
-
-    robot: of the catalogue.
-    """
+    """Return the constant errors that are always the same error as one, itself included."""
     return frozenset(_alike(robot, site))
 
 
@@ -143,12 +135,7 @@ class Whole(NamedTuple):
 
 
 def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
-    """
-    Return an answer held against its truth.
-
-    truth: with what every cause shows.
-    verdict: as diagnosis.json has it, of any schema.
-    """
+    """Return an answer of any schema held against its truth, which has what every cause shows."""
     at_work = [alike_by_structure(truth['robot'], (e, j)) for e, j in truth['sites']]
     out = [
         e in truth['excluded'] or not any(own in REGISTRY for own, _ in alike)

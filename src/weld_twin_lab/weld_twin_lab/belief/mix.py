@@ -80,11 +80,7 @@ class Drawn(NamedTuple):
 
 
 def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
-    """
-    Return case ``number`` of a seed and a mix; it depends on nothing else.
-
-    Raises DataError: no cell and motion show such causes.
-    """
+    """Return case ``number`` of a seed and a mix; raises DataError where no motion shows its causes."""
     if mix == SEVERAL:
         return _of_several(seed, number)
     if mix == EVERYWHERE:
@@ -136,11 +132,7 @@ def _of_everywhere(seed: int, number: int) -> Drawn:
 
 
 def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:
-    """
-    Return what a case of the mix of several is to be.
-
-    rng: of the case.
-    """
+    """Return what a case of the mix of several is to be."""
     count = 1 + number % MOST
     crowded = count >= MOST - 1
     motion = str(rng.choice(CROWDED if crowded else MOTIONS))

@@ -166,11 +166,7 @@ def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float) -> _Weighed
 
 
 def _refined(bench: _Bench, cause: Cause, whole: Array) -> tuple[Array, Array, _Weighed]:
-    """
-    Return the sizes of a cause as given and as fitted, in units of its columns, and its weight.
-
-    whole: what it moves beside the others, (rows,).
-    """
+    """Return the sizes of a cause as given and as fitted, in units of its columns, and its weight."""
     changes = changed([*bench.beside, cause], len(bench.beside))
     columns = [(moved(bench.cell, new, bench.takes) - whole) / STEP for new in changes]
     chi2, step, predicted, volume = _solved(bench, whole, np.array(columns).T)
@@ -202,11 +198,7 @@ def _scaled(cause: Cause, key: str) -> Array:
 
 
 def _solved(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, Array, float]:
-    """
-    Return chi-square, coefficients of the columns, the prediction, and the log volume of the posterior.
-
-    whole: what the causes move, (rows,); columns: their derivatives, (rows, k).
-    """
+    """Return chi-square, coefficients of columns (rows, k), prediction, log volume of the posterior."""
     seen, design = slice(bench.seen), np.concatenate([columns, bench.nuisance], axis=1)
     gap = bench.y - whole
     step = fitted(design[seen], gap[seen])

@@ -29,11 +29,7 @@ def rounded(value: Any) -> Any:
 
 
 def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
-    """
-    Write a table of cases.
-
-    rows: as `judged.kept` gives them. A path that ends in .gz is packed.
-    """
+    """Write a table of cases, as `judged.kept` gives them; packed where its name ends in .gz."""
     lines = (json.dumps(rounded(row), separators=(',', ':')) for row in rows)
     text = '\n'.join(lines) + '\n'
     packed = (
@@ -43,11 +39,7 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """
-    Return a table of cases.
-
-    Raises DataError: there is no such table.
-    """
+    """Return a table of cases; raises DataError where there is no such table."""
     try:
         raw = path.read_bytes()
         text = (gzip.decompress(raw) if path.suffix == '.gz' else raw).decode('utf-8')

@@ -45,11 +45,7 @@ ORACLE = 0.99
 
 
 def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
-    """
-    Return the measures of verdicts and of levels.
-
-    rows: as `judged.kept` gives them; none of them was learned from.
-    """
+    """Return the measures of verdicts and of levels on rows of `judged.kept` that taught nothing."""
     single = _of('single')
     named = [r for r in rows if single(r) and r['status'] != 'none']
     seconds = [float(r['seconds']) for r in rows]
@@ -176,33 +172,20 @@ MIX = (
 
 
 def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dict[str, Any]]:
-    """
-    Return the rows of the first cases of a seed; those in the runner's store are not made anew.
-
-    mix: as `tried` takes it.
-    """
+    """Return the rows of the first cases of a seed; those in the runner's store are not made anew."""
     tasks = [Task(tried, (seed, number, mix), f'case {number}') for number in range(count)]
     return [{'mix': mix, **kept(row)} for row in runner.run(tasks)]
 
 
 def with_oracle(rows: Sequence[dict[str, Any]], runner: Runner) -> list[dict[str, Any]]:
-    """
-    Return rows with what an oracle is sure of, where it is asked: `oracle.certainty`.
-
-    rows: as `rows_of` gives them.
-    """
+    """Return rows of `rows_of` with what an oracle is sure of, where it is asked: `oracle.certainty`."""
     cases = [(*map(int, str(row['name']).split('/')), str(row['mix'])) for row in rows]
     tasks = [Task(certainty, case, f'oracle on case {case[1]}') for case in cases]
     return [{**row, 'oracle': p} for row, p in zip(rows, runner.run(tasks), strict=True)]
 
 
 def fit(rows: Sequence[Mapping[str, Any]], risk: float = terms.RISK) -> dict[str, Any]:
-    """
-    Return the content of the file of weights that some cases teach.
-
-    rows: as `judged.kept` gives them.
-    risk: probability that an answer may be sure and wrong.
-    """
+    """Return the content of the file of weights that rows of `judged.kept` teach."""
     own = [row for row in rows if row.get('examples')]
     card = {
         'cases': len(own),
@@ -289,11 +272,7 @@ def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def page(result: Mapping[str, Any]) -> str:
-    """
-    Return the whole in Markdown.
-
-    result: as `study.judged` gives it.
-    """
+    """Return results of `judged` in Markdown."""
     return '\n'.join(
         [
             *_bounds(result['learned_from'], result['judged_on']),

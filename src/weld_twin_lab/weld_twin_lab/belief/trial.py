@@ -27,12 +27,7 @@ from .visible import shown, there
 
 
 def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
-    """
-    Return the row of one case: its truth, what was said of it, and on what evidence.
-
-    seed, number: of the case, as the mix takes them.
-    mix: `USUAL` or `SEVERAL`.
-    """
+    """Return the row of one case: its truth, what was said of it, and on what evidence."""
     name = f'{seed}/{number}'
     try:
         case, poor, held_out, small = drawn(seed, number, mix)
@@ -47,12 +42,7 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
 def row_of(
     name: str, case: SealedCase, *, held_out: bool = True, small: Sequence[Cause] = ()
 ) -> dict[str, Any]:
-    """
-    Return the row of a case.
-
-    held_out: whether its held-out recording is given to the diagnosis.
-    small: errors everywhere besides its causes.
-    """
+    """Return the row of a case, with small errors everywhere besides its causes or without."""
     row: dict[str, Any] = {
         'name': name,
         'engine': engine_digest()[:16],
@@ -91,11 +81,7 @@ def said(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording]:
-    """
-    Return the recordings of a case that are to be diagnosed.
-
-    more: further ones of the same truth.
-    """
+    """Return the recordings of a case that are to be diagnosed, with more of the same truth."""
     also = [
         as_recording(f'{seal.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
         for k, taken in enumerate((*case.also, *more))
@@ -106,11 +92,7 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
 def diagnosed(
     case: SealedCase, recordings: Sequence[Recording], *, held_out: bool = False
 ) -> Diagnosis:
-    """
-    Return the diagnosis of recordings of a case.
-
-    held_out: whether the held-out recording of the case is given.
-    """
+    """Return the diagnosis of recordings of a case, its held-out recording given or not."""
     cell = case.cell
     return diagnose(
         recordings,

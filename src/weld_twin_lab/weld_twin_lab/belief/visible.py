@@ -68,11 +68,7 @@ def fitted(design: Array, target: Array) -> Array:
 
 
 def moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
-    """
-    Return how far causes move what is measured on all recordings, over its noise, (rows,).
-
-    Of each recording the positions, and then the turns where the cell measures them.
-    """
+    """Return how far causes move positions, then turns where measured, over the noise, (rows,)."""
     out = []
     for taken in takes:
         out.append(deviation(cell, causes, taken).ravel() / cell.tracker.sigma)

@@ -118,11 +118,7 @@ def _with_screws(
     ways: Mapping[str, Callable[[Array], tuple[Array, Array]]],
     as_peers: Callable[[Array], Array],
 ) -> list[Contender]:
-    """
-    Return the contenders for poses and their derivatives.
-
-    as_peers: brings the kernel's screws (6, k, N) into the form that peers give.
-    """
+    """Return the contenders for poses and derivatives; ``as_peers`` brings screws into their form."""
     poses, out = kernel.screws(q)
     result = as_peers(out[..., :LOOPED])
     wanted = ways[REFERENCE](q[:LOOPED])[1] if REFERENCE in ways else result

@@ -169,11 +169,7 @@ def commit_of(place: Path) -> str:
 
 
 def merged(kept: Sequence[Entry], new: Sequence[Entry]) -> list[Entry]:
-    """
-    Return entries measured earlier with the new ones in their places, in the order of `JOBS`.
-
-    kept, new: as `measured` gives them. What is no job any more is left out.
-    """
+    """Return entries of `measured` with new ones in their places; what is no job any more is out."""
     by_job = {entry['job']: entry for entry in (*kept, *new)}
     return [by_job[job.name] for job in JOBS if job.name in by_job]
 

@@ -45,11 +45,7 @@ WORN = 4
 
 
 def fill(database: Database, cells: int, diagnoses: int, seed: int = 1) -> None:
-    """
-    Fill an empty database.
-
-    cells, diagnoses: so many cells, with so many diagnoses each.
-    """
+    """Fill an empty database with so many cells, and so many diagnoses of each."""
 
     def work(connection: Connection) -> None:
         for number in range(cells):
@@ -112,11 +108,7 @@ STATIONS, ROWS = 2772, 100_000
 
 
 def made(name: str, folder: Path) -> Path:
-    """
-    Return where data are, made where they are not there yet.
-
-    name: one of `MAKERS`.
-    """
+    """Return where data of one of `MAKERS` are, made where they are not there yet."""
     place = folder / ('table.csv' if name == 'table' else name)
     if not place.exists():
         MAKERS[name](place)
@@ -136,11 +128,7 @@ def moving(seconds: float) -> Recording:
 
 
 def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -> Recording:
-    """
-    Return a recording with what a twin with effects and noise would measure.
-
-    at: shape (M,) [s].
-    """
+    """Return a recording with what a twin with effects and noise would measure at times (M,) [s]."""
     rng = np.random.default_rng(7)
     poses = Twin(robot, effects).poses(commanded, at)
     position = poses.position + rng.normal(scale=NOISE, size=poses.position.shape)

@@ -54,11 +54,7 @@ RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 
 
 def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    """
-    Return a cause of its typical size on a joint drawn at random.
-
-    span: duration of the recording, for what happens at a time [s].
-    """
+    """Return a cause of its typical size on a joint drawn at random, for a recording of a span [s]."""
     typical = CAUSES[family]
     drawn = typical.draw(robot, span, rng)
     if not typical.signed:
@@ -68,11 +64,7 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
 
 
 def plausible(robot: Robot, cause: Mapping[str, Any], factor: float) -> bool:
-    """
-    Tell whether a cause may be so many times its typical size.
-
-    cause: of its typical size.
-    """
+    """Tell whether a cause of its typical size may be so many times as large."""
     family = cause['effect']
     if not LEAST.get(family, SPREAD[0]) < factor < MOST.get(family, SPREAD[1]):
         return False
@@ -84,11 +76,7 @@ def plausible(robot: Robot, cause: Mapping[str, Any], factor: float) -> bool:
 
 
 def machines(robot: Robot, cause: Mapping[str, Any], key: str) -> float:
-    """
-    Return the largest value of a parameter that a machine has.
-
-    key: of the parameter that is its size.
-    """
+    """Return the largest value that a machine has of the parameter that is a cause's size."""
     parameter = TWINS.get((cause['effect'], key), key)
     return plausible_of(robot, cause['effect'], parameter, cause.get('joint')).high
 

@@ -48,11 +48,7 @@ TO_90 = NORMAL_90 / 1.959963984540054
 def nominal_on(
     robot: Robot, known: tuple[Effect, ...], recording: Recording, align: Collection[str]
 ) -> Model:
-    """
-    Return the nominal model with the frames that a diagnosis of this recording starts from.
-
-    align: frames that are fitted.
-    """
+    """Return the nominal model with the frames that a diagnosis of this recording starts from."""
     model = Model(robot, (robot.T_world_base,), known)
     if not align:
         return model
@@ -67,11 +63,7 @@ def gap_on(model: Model, recording: Recording) -> Array:
 
 
 def counted(recording: Recording, outliers: list[int]) -> Array:
-    """
-    Return the samples to count: no outliers, none outside the joint stream, shape (M,).
-
-    outliers: numbers of the samples that are none of the arm's doing.
-    """
+    """Return the samples to count: no outliers, none outside the joint stream, shape (M,)."""
     t, joints = measured_of(recording).t, recording.joints
     good = (t >= joints.t[0]) & (t <= joints.t[-1])
     good[np.asarray(outliers, dtype=int)] = False
@@ -79,11 +71,7 @@ def counted(recording: Recording, outliers: list[int]) -> Array:
 
 
 def measured_of(recording: Recording) -> Measurements:
-    """
-    Return what was measured.
-
-    Raises DataError: nothing was.
-    """
+    """Return what was measured; raises DataError where nothing was."""
     if recording.measured is None:
         raise DataError(f'the recording {recording.name!r} of a case holds no measurements')
     return recording.measured

@@ -70,11 +70,7 @@ class NotVisible(Exception):
 def sized(
     cell: BlindCell, causes: Sequence[Cause], taken: Take, wanted: float
 ) -> tuple[list[Cause], Array]:
-    """
-    Return causes grown together until their deviation is so many times the noise, and the deviation.
-
-    Raises NotVisible: one would have to be implausibly large or small.
-    """
+    """Return causes grown together to so many times the noise, and their deviation; or NotVisible."""
     factor = 1.0
     for _ in range(4):
         grown = [scaled(cause, factor) for cause in causes]
@@ -101,11 +97,7 @@ def draw_causes(
     taken: Take,
     rng: np.random.Generator,
 ) -> tuple[list[Cause], list[float]]:
-    """
-    Return causes of the families, and how many times the noise each is.
-
-    Raises NotVisible: a family cannot be seen on this motion.
-    """
+    """Return causes of the families, and how many times the noise each is; raises NotVisible."""
     causes: list[Cause] = []
     offs: list[Array] = []
     for family, stratum in zip(families, strata, strict=True):

@@ -47,12 +47,7 @@ def share(hits: Sequence[bool]) -> Estimate:
 def bootstrap(
     values: Sequence[float] | Array, statistic: Callable[..., Array] = np.median
 ) -> Estimate:
-    """
-    Return a statistic with its percentile bootstrap interval.
-
-    values: rows are cases, shape (N, k).
-    statistic: takes values and ``axis``.
-    """
+    """Return a statistic of rows (N, k) and an ``axis`` with its percentile bootstrap interval."""
     rows = np.asarray(values, dtype=float)
     n = rows.shape[0]
     if n == 0:
@@ -114,11 +109,7 @@ class Measure:
 
 
 def measure_table(measures: Sequence[Mapping[str, Any]]) -> str:
-    """
-    Return measures beside their goals in Markdown.
-
-    measures: as `Measure.as_dict` gives them.
-    """
+    """Return measures, as `Measure.as_dict` gives them, beside their goals in Markdown."""
     return markdown.table(HEADS, *map(_row, measures))
 
 

@@ -29,11 +29,7 @@ LONGEST = 2.0
 
 
 def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator) -> Array:
-    """
-    Return joint positions along one seam, smooth or aggressive, shape (N, n).
-
-    Raises PathError: none of the seams drawn can be welded.
-    """
+    """Return joint positions along one seam, (N, n); raises PathError where none drawn can be welded."""
     most = int(np.ceil(LONGEST * span * rate))
     for _ in range(TRIES):
         q, seam, torch = drawn_seam(robot, rng)
@@ -124,12 +120,7 @@ class Motion(NamedTuple):
 
 
 def motion(kind: str, robot: Robot, span: float, rng: np.random.Generator) -> Motion:
-    """
-    Return a motion drawn at random.
-
-    kind: 'seams', 'free' or 'stations'.
-    span: about how long [s]; two seconds for every station.
-    """
+    """Return 'seams', 'free' or 'stations' drawn at random, about so long [s]; 2 s for every station."""
     return {'seams': _seams, 'free': _free, 'stations': _stations}[kind](robot, span, rng)
 
 

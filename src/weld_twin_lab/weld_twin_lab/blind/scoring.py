@@ -133,11 +133,7 @@ def _right(kind: str, status: str, exact: bool) -> bool:
 
 
 def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
-    """
-    Return every list of sites that is as right as the truth, by the library's names.
-
-    truth: as `making.truth_of` gives it.
-    """
+    """Return every list of sites that is as right as a truth, by the library's names."""
     return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
 
 

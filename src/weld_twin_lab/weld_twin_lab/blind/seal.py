@@ -41,11 +41,7 @@ SCHEMAS = {
 
 
 def read(path: Path) -> dict[str, Any]:
-    """
-    Return the content of one of the JSON files above.
-
-    Raises DataError: it cannot be read or is something else.
-    """
+    """Return the content of one of the JSON files above; raises DataError where it is none."""
     data, wanted = read_json(path), SCHEMAS[path.name]
     if data.get('schema') != wanted:
         raise DataError(f"'{path}' has the schema {data.get('schema')!r}, expected {wanted}")

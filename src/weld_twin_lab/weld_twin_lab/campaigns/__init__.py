@@ -49,11 +49,7 @@ def run(study: Study) -> bool:
 def write_result(
     path: Path | str, campaign: str, seconds: float, result: Mapping[str, Any]
 ) -> None:
-    """
-    Write what came of a campaign, beside where and with what it ran.
-
-    Raises DataError: the file is something else's, or cannot be written.
-    """
+    """Write what came of a campaign, and with what it ran; raises DataError as `refuse_foreign` does."""
     refuse_foreign(path, campaign)
     head = {
         'schema': SCHEMA,
@@ -71,11 +67,7 @@ def write_result(
 
 
 def refuse_foreign(path: Path | str, campaign: str) -> None:
-    """
-    Refuse to replace anything but an older result of the same campaign.
-
-    Raises DataError: something else is there.
-    """
+    """Raise DataError where anything is but an older result of the same campaign."""
     target = Path(path)
     if not target.exists():
         return

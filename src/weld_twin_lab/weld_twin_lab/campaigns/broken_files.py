@@ -261,11 +261,7 @@ Change = Callable[[Random, bytes], bytes]
 
 
 def mutate(rng: Random, seed: bytes, kind: str) -> bytes:
-    """
-    Return a seed with a few things wrong.
-
-    kind: 'yaml' and 'json' are also changed as trees, 'binary' never as text.
-    """
+    """Return a seed with a few things wrong: 'binary' never as text, 'yaml' and 'json' also as trees."""
     if kind in ('yaml', 'json') and rng.random() < 0.5:
         return _tree(rng, seed, kind)
     changes = _BINARY if kind == 'binary' else _TEXT + _BINARY[:3]

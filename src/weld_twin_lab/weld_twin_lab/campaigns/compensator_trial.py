@@ -284,11 +284,7 @@ def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
 def tried(
     arm: Arm, goals: int, models: tuple[Learned, Learned | None], known: Known
 ) -> Iterator[str]:
-    """
-    Add what becomes of the goals of one arm, and of its changes, to what is known already.
-
-    Yields what came of it so far, again and again.
-    """
+    """Add what becomes of an arm's goals and changes to what is known, and yield now and then so far."""
     done = sum(not row['after'] for row in arm.of(known.rows))
     with _cell() as (cell, folder):
         trial = CellTrial(cell, folder, arm, models)

@@ -174,11 +174,7 @@ def arms_of(goals: int, each: int, seed: int) -> list[Arm]:
 
 
 def drawn_goal(robot: Robot, rng: np.random.Generator) -> DrawnGoal:
-    """
-    Return a straight or bent seam, there or there and back, as points of a goal.
-
-    Raises DataError: none of those drawn can be travelled.
-    """
+    """Return a straight or bent seam, there or there and back; raises DataError where none will do."""
     home, inside = np.array(HOMES[robot.name]), bool(rng.random() >= FAR)
     bare = robot.with_frames(base=np.eye(4))
     for _ in range(TRIES):

@@ -53,17 +53,7 @@ NODES: dict[str, dict[str, Any]] = {
 
 
 class Bench:
-    """
-    The cell, its clock, and the joint states sent so far.
-
-    Attributes
-    ----------
-    sent : dict
-        Joint positions of all sound joint states by their stamp [ns].
-    stamp : int [ns]
-        Time of the cell; goes on with every joint state.
-
-    """
+    """The cell, its clock, and the joint states sent so far."""
 
     def __init__(self, cell: Cell, bag: Path) -> None:
         self.cell = cell
@@ -154,23 +144,7 @@ MEETING = 60.0
 
 
 class Stand:
-    """
-    Joint states and measured poses on a beat of the machine's clock; a fault changes one of them.
-
-    Attributes
-    ----------
-    folder : Path
-        For files.
-    offset : callable
-        How far the tracker's clock is ahead [s], of the time since the beginning [s].
-    frame : str
-        What the tracker calls its frame.
-    T_seen : array, shape (4, 4)
-        The measuring frame as the tracker sees it.
-    other : Node
-        A node of somebody else, in a participant of its own.
-
-    """
+    """Joint states and measured poses on a beat of the machine's clock; a fault changes one of them."""
 
     def __init__(self, cell: Cell, folder: Path) -> None:
         self.cell, self.folder = cell, folder
@@ -252,12 +226,7 @@ class Stand:
     # Waiting ---------------------------------------------------------------------------------
 
     def reported(self, node: str, words: str, within: float) -> tuple[float | None, str]:
-        """
-        Return after how long [s] a node's health tells something, and the whole sentence.
-
-        node: its full name.
-        within: [s]
-        """
+        """Return after how long [s] a node's health tells something, and the whole sentence."""
         self.health.clear()
         begun, sentence = time.monotonic(), ['']
 

@@ -110,11 +110,7 @@ BUILT = 'weld_twin_messages_'
 
 
 def folder_of_messages() -> Path | None:
-    """
-    Return a folder for ``PYTHONPATH`` that has the packages; None where they are installed.
-
-    Raises TwinError: they cannot be built here; the message says why.
-    """
+    """Return a folder for ``PYTHONPATH`` with the packages; None where installed; raises TwinError."""
     absent = [package for package in DEFINITIONS if not _installed(package)]
     if not absent:
         return None
@@ -221,12 +217,7 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
 
 
 def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
-    """
-    Make a library of the structures, one of each type support, and the Python module.
-
-    The middleware loads a type support by the name of its library; it is there already, for the
-    module needs it.
-    """
+    """Make a library of the structures, one of each type support, and the Python module."""
     include = folder / 'include' / package
     include.mkdir(parents=True)
     for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / JOINT, made):

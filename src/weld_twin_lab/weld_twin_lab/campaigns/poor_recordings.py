@@ -164,12 +164,7 @@ def tried(draw: Draw) -> dict[str, Any]:
 
 
 def worst_of(count: int, first: int, tell: Callable[[str], None]) -> dict[str, Any]:
-    """
-    Return how many draws ended how, and those that went wrong.
-
-    count, first: so many draws, from this one on.
-    tell: told every draw that went wrong.
-    """
+    """Return how many draws, from the first on, ended how, and those that went wrong."""
     statuses: Counter[str] = Counter()
     bad = []
     with warnings.catch_warnings():

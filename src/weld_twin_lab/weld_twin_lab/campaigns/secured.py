@@ -169,15 +169,7 @@ ABSENT = 3
 
 
 def keystore(folder: Path, policy: Path, enclaves: Iterable[str]) -> Path:
-    """
-    Return a new keystore for the domain of the environment.
-
-    folder: where to make it.
-    policy: what each enclave may do.
-    enclaves: all of them stand in the policy.
-
-    Raises TwinError: sros2 is not here, or fails.
-    """
+    """Return a new keystore for the domain of the environment; raises TwinError where sros2 fails."""
     command = [sys.executable, '-m', __name__, str(folder), str(policy), *enclaves]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     said = (done.stderr or done.stdout).strip()

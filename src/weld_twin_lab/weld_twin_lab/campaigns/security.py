@@ -69,11 +69,7 @@ PARTY = f"""\
 
 
 def locks(folder: Path) -> list[dict[str, str]]:
-    """
-    Return what each of the parties has in its environment, the nodes' own first.
-
-    Raises TwinError: no keys can be made.
-    """
+    """Return the environment of each party, the nodes' own first; raises TwinError without keys."""
     file = folder / 'policy.xml'
     file.write_text(HEAD + PARTY + policy().removeprefix(HEAD).removesuffix(TAIL) + TAIL)
     everybody = [enclave(name) for name in (*MODULES, party.NAME)]

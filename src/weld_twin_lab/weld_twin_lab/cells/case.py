@@ -49,12 +49,7 @@ READY = (0.3, -1.2, 1.3, 0.4, 1.0, 0.2, 0.3)
 
 
 def cell(kind: str, seed: int) -> dict[str, Any]:
-    """
-    Return the robot file of a cell.
-
-    kind: one of `KINDS`.
-    seed: decides which arms.
-    """
+    """Return the robot file of a cell of one of `KINDS`; the seed decides which arms."""
     arm = catalog.load(ARMS[seed % len(ARMS)]).to_mapping()
     arm['tool'] = {'xyz': [0.02, -0.03, 0.15]}
     if kind == 'track and positioner':
@@ -162,12 +157,7 @@ CellResult = dict[str, Any]
 
 
 def sealed(kind: str, seed: int) -> CellResult:
-    """
-    Return what a tracker tells of one cause in a cell, opened.
-
-    kind: one of `drawn.KINDS`.
-    seed: decides arms, postures, cause and size.
-    """
+    """Return what a tracker tells of one cause in a cell of one of `KINDS`, opened."""
     rng = np.random.default_rng([seed, len(kind)])
     robot, q, truly = _drawn(kind, seed, rng, SWING)
     cause, shown = _cause(robot, truly, np.sqrt(3.0) * SIGMA, rng)

@@ -152,11 +152,7 @@ def _kept(place: Path, count: int) -> Run:
 
 
 def ended(words: Sequence[str], case: Path, place: Path) -> dict[str, Any]:
-    """
-    Have the answer to a case written to a place; return what a `Run` says of it beside the answer.
-
-    words: the command of a method, with {case} and {out} in it.
-    """
+    """Have a command answer a case; return what a `Run` says of it beside the answer."""
     filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
     with (place / SAID).open('w', encoding='utf-8') as said:
         code, cost = cost_of(filled, said=said, limit=LIMIT)

@@ -151,11 +151,7 @@ def _write(path: Path, names: Sequence[str], columns: Sequence[Array]) -> None:
 
 
 def read_case(folder: Path) -> ContestCase:
-    """
-    Return a case.
-
-    Raises DataError: a file is missing or no table.
-    """
+    """Return a case; raises DataError where a file is missing or no table."""
     try:
         said = json.loads((folder / _CASE).read_text(encoding='utf-8'))
         measured = _read(folder / 'train_measured.csv')
@@ -213,13 +209,7 @@ def write_answer(folder: Path, answer: ContestAnswer) -> None:
 
 
 def read_answer(folder: Path, count: int) -> ContestAnswer:
-    """
-    Return an answer.
-
-    count: positions that were asked for.
-
-    Raises DataError: it is missing or not in the form that is asked for.
-    """
+    """Return an answer to so many questions; raises DataError where it is missing or out of form."""
     try:
         said = json.loads((folder / ANSWER).read_text(encoding='utf-8'))
         causes = tuple(

@@ -170,11 +170,7 @@ def _sure_wrong(answer: ContestAnswer, case: Sealed) -> bool:
 
 
 def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nominal: str) -> str:
-    """
-    Return the table of all methods in Markdown.
-
-    nominal: what is said of a method that gave no answer: it is taken for the nominal arm, silent.
-    """
+    """Return the table of all methods in Markdown, and what is said of those without an answer."""
     rows = [(method, summary(said, cases)) for method, said in runs.items()]
     return tabled(COLUMNS, rows) + f'\n{nominal}\n'
 

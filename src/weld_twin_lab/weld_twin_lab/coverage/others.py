@@ -42,11 +42,7 @@ EACH = 15
 
 
 def of_seam(language: str, seed: int, number: int) -> dict[str, Any] | None:
-    """
-    Return what is promised of an arm and of a seam before and after it is corrected, and what is true.
-
-    None where no seam can be drawn.
-    """
+    """Return what is promised of an arm and a seam, and what is true; None where none can be drawn."""
     try:
         seam = sealed_seam(language, seed, number)
     except TwinError:
@@ -148,11 +144,7 @@ class Sealed(NamedTuple):
 
 
 def made(seed: int) -> Sealed:
-    """
-    Return one sealed case.
-
-    seed: decides the arm, the cause, its size, the slack and the postures.
-    """
+    """Return one sealed case."""
     rng = np.random.default_rng(seed)
     tool = np.eye(4)
     tool[:3, 3] = [0.02, -0.03, 0.15]
@@ -190,12 +182,7 @@ def _shown(robot: Robot, recording: Recording) -> float:
 
 
 def postures_at(robot: Robot, place: Array, count: int, rng: np.random.Generator) -> Array:
-    """
-    Return nominal postures in which the tool point is at a place, within the limits.
-
-    place: shape (3,) [m].
-    count: how many at the most.
-    """
+    """Return nominal postures, ``count`` at most, with the tool point at a place (3,) [m]."""
     low, high = np.maximum(robot.lower, -TURN), np.minimum(robot.upper, TURN)
     start = rng.uniform(low, high, (TRIES * count, robot.n))
     q, near = reaching(robot, np.tile(place, (len(start), 1)), start)
@@ -211,12 +198,7 @@ def _touching(
     places: Array,
     rng: np.random.Generator,
 ) -> Recording:
-    """
-    Return the joint readings at which the plant's own tool point touches.
-
-    q: postures to start from, shape (M, n) [rad or m].
-    places: where each touch takes place, shape (M, 3) [m].
-    """
+    """Return the joint readings, from postures (M, n) on, at which the plant's tool touches places."""
     for _ in range(ROUNDS):
         real = at_stations(robot, causes, q, Tracker(), rng).position
         q = q + least_step(jacobian(robot, q)[:, :3], places - real, STRETCHED)

@@ -48,11 +48,7 @@ ROUNDING = 1e-9
 
 
 def of_case(seed: int, number: int) -> dict[str, Any] | None:
-    """
-    Return what the promises of one sealed case are worth; None of one that has none.
-
-    seed, number: as `mix.drawn` takes them.
-    """
+    """Return what the promises of one sealed case are worth; None of one that has none."""
     try:
         case, poor, *_ = drawn(seed, number)
         case = one_arm(case)

@@ -45,11 +45,7 @@ class Heard(NamedTuple):
 
 
 def heard(cases: Sequence[Mapping[str, Any]]) -> Heard:
-    """
-    Return the answers that say what the causes are, of cells as a study keeps them.
-
-    cases: as in investigate.json.
-    """
+    """Return the answers that say what the causes are, of cells as in investigate.json."""
     rows = [
         (answer['signs'], answer['right'], k, turn)
         for k, case in enumerate(cases)
@@ -80,12 +76,7 @@ def unseen(all_: Heard) -> Array:
 
 
 def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
-    """
-    Return in how many cells the first answer that is believed so far is right, and in how many wrong.
-
-    probability: shape (N,).
-    least: belief that it has to have.
-    """
+    """Return in how many cells the first answer believed by so much is right, and in how many wrong."""
     counts = [0, 0]
     for cell in np.unique(all_.cell):
         own = np.flatnonzero((all_.cell == cell) & (probability >= least))

@@ -147,11 +147,7 @@ def _batches(seed: int, wanted: int) -> Iterator[list[Task]]:
 
 
 def investigated_cell(seed: int, number: int) -> dict[str, Any]:
-    """
-    Return what came of one cell, in plain values; the simulator is loaded where it is needed.
-
-    seed, number: decide the cell.
-    """
+    """Return what came of one cell, in plain values; the simulator is loaded where it is needed."""
     require_simulator()
     from .trial import SealedCell, looped, poor_at_first
 

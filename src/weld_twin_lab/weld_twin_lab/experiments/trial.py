@@ -124,12 +124,7 @@ def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | N
 def looped(
     cell: SealedCell, diagnosis: Mapping[str, Any], first: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """
-    Return what came of one cell that was investigated.
-
-    diagnosis: the first diagnosis.
-    first: the same in short.
-    """
+    """Return what came of one cell that was investigated after a first diagnosis."""
     rounds, end, answer = investigated(cell, cell.first, diagnosis, dict(first))
     return {
         'name': cell.name,
@@ -195,24 +190,7 @@ STAY = 15.0
 
 
 class SealedCell:
-    """
-    One cell with causes at work that only `opened` tells.
-
-    lot: what the case is to be.
-    seed, number: decide everything random in it.
-
-    Attributes
-    ----------
-    robot : Robot
-        As whoever diagnoses knows it.
-    still : bool
-        Whether the instrument measures at rest alone.
-    poor : str
-        How the first recording is poor.
-    seal : str
-        The hash of the truth, published before anything is diagnosed.
-
-    """
+    """One cell with causes at work that only `opened` tells; seed and number decide what is random."""
 
     def __init__(self, lot: Lot, seed: int, number: int) -> None:
         rng = np.random.default_rng([seed, number])
@@ -240,12 +218,7 @@ class SealedCell:
         return as_recording('first', record(self._case.cell, self._case.causes, self._case.train))
 
     def made(self, name: str, motion: Motion, seed: int, changed: str = '') -> Recording:
-        """
-        Return the recording of a motion.
-
-        seed: decides noise and surroundings.
-        changed: what is changed in the cell for it, as `set_up_change` reads it.
-        """
+        """Return the recording of a motion, with a change in the cell as `set_up_change` reads it."""
         rng = np.random.default_rng([seed, *name.encode()])
         cell = self._case.cell
         if not motion.static:

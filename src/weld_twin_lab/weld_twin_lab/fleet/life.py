@@ -247,11 +247,7 @@ def set_up(rng: np.random.Generator) -> Cause:
 def diagnosed(
     yearly: YearlyCell, causes: Sequence[Cause], check: int, seed: int, place: Path, at: datetime
 ) -> Entry:
-    """
-    Return the entry of one check: simulated, written as a bag, diagnosed by the command.
-
-    Raises DataError: the command refused it.
-    """
+    """Return the entry of one check: simulated, written as a bag, diagnosed by the command."""
     taken = yearly.checks[check]._replace(seed=seed)
     made = as_recording('check', record(yearly.cell, causes, taken))
     shutil.rmtree(place, ignore_errors=True)

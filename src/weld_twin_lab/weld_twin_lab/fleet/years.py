@@ -68,12 +68,7 @@ MORE = {
 
 
 def run_years(seed: int, years: int, cells: int, full: int, runner: Runner) -> dict[str, Any]:
-    """
-    Return all figures of the study.
-
-    seed, years, cells: so many drawn years of so many cells.
-    full: years that are diagnosed in full, of cells of their own.
-    """
+    """Return all figures: of drawn years of some cells, and of full years of cells of their own."""
     wanted = [
         Task(base, (seed, number, check), f'cell {number + 1}')
         for number in range(cells + full)
@@ -262,12 +257,7 @@ def scored(
 
 
 def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """
-    Return what a year of weekly looks came to.
-
-    seed, number: of the year; the same numbers give the same year.
-    bases: entries of the cell's checks.
-    """
+    """Return what a year of weekly looks came to, from entries of the cell's checks."""
     rng = np.random.default_rng([seed, 1_000_000 + number])
     checks = _common([Entry.of_plain(base) for base in bases])
     lived = year(checks[0], rng)

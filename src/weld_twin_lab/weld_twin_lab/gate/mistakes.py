@@ -47,13 +47,7 @@ class Sound:
 
 
 def draw(rng: np.random.Generator, *, rich: bool = False) -> Sound:
-    """
-    Return a sound recording drawn at random.
-
-    rich: only motions that show every joint.
-
-    Raises DataError: none came about.
-    """
+    """Return a sound recording drawn at random; a rich one shows every joint."""
     for _ in range(TRIES):
         with suppress(NotVisible, FloatingPointError, DataError):
             return _drawn(rng, rich)

@@ -25,11 +25,7 @@ RATING_POSES = 200
 
 
 class Compliant:
-    """
-    The joints that give.
-
-    robot: the robot file.
-    """
+    """The joints of a robot file that give."""
 
     def __init__(self, robot: Entry, arm: Arm, causes: Causes, richness: float) -> None:
         extra = [
@@ -141,11 +137,7 @@ COARSE = 0.02
 
 
 class Pedestal:
-    """
-    The springs under an arm.
-
-    parts: the arm with its load.
-    """
+    """The springs under an arm with its load."""
 
     def __init__(self, parts: Compliant, causes: Causes) -> None:
         self.parts = parts

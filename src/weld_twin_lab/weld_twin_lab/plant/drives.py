@@ -32,14 +32,7 @@ HARDENING = 0.1
 
 
 def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline | None:
-    """
-    Return how far the motors are from the command, as a function of time.
-
-    Returns
-    -------
-    CubicSpline with values (n,) [rad or m], or None where no drive has a flaw.
-
-    """
+    """Return how far motors are from the command over time [rad or m]; None where drives are right."""
     lag = causes.per_joint('servo_lag', 'time_constant')
     shaking = list(causes.of('vibration'))
     if course.command.static or not (lag.any() or shaking):

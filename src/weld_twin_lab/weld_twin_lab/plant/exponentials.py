@@ -196,15 +196,7 @@ class Course:
 
 
 class Rows(NamedTuple):
-    """
-    Numbers of the DH rows; leading axes, if any, are samples.
-
-    Attributes
-    ----------
-    theta, alpha, beta : array, shape (..., n) [rad]
-    d, a : array, shape (..., n) [m]
-
-    """
+    """Numbers of the DH rows [rad, m], shape (..., n); leading axes, if any, are samples."""
 
     theta: np.ndarray
     d: np.ndarray
@@ -277,11 +269,7 @@ def _frame(entry: Entry | None) -> Motion:
 
 
 def home(arm: Arm, rows: Rows | None = None) -> Home:
-    """
-    Place the joint axes and the links of the arm at its home position.
-
-    rows: the rows as built, where they differ from the file's.
-    """
+    """Place axes and links at the home position, by the rows as built or those of the file."""
     rows = arm.rows if rows is None else rows
     at = identity()
     axes, points, acrosses, links = [], [], [], []

@@ -134,12 +134,7 @@ class Statics:
         self._tool = model.body('tool').id
 
     def torque(self, q: np.ndarray, wrench: np.ndarray | None = None) -> np.ndarray:
-        """
-        Return the load torque on each joint, shape (N, n) [N m, or N for a slide].
-
-        q: shape (N, n).
-        wrench: force and torque on the tool, tool frame, shape (N, 6).
-        """
+        """Return the load torque on each joint, (N, n), with a wrench on the tool, its frame, (N, 6)."""
         data, tau = self._data, np.empty_like(q)
         for k, row in enumerate(q):
             data.qpos[:] = row

@@ -146,11 +146,7 @@ def heated(t: np.ndarray, warming_time: float) -> np.ndarray:
 
 
 def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
-    """
-    Return the error of the joints' transmissions, shape (..., n) [rad or m].
-
-    q: motor side, in units of the joint, shape (..., n).
-    """
+    """Return the error of the joints' transmissions at motor positions, shape (..., n) [rad or m]."""
     error: np.ndarray = causes.per_joint('gear_ratio', 'scale') * q
     error += causes.per_joint('joint_offset', 'offset')
     for item in causes.of('transmission_ripple'):

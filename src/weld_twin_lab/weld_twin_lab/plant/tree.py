@@ -68,11 +68,7 @@ def moving(
 
 
 class Tree:
-    """
-    The MuJoCo arm of one recording, and the forces that drive it.
-
-    wrench: shape (N, 6).
-    """
+    """The MuJoCo arm of one recording with a wrench (N, 6), and the forces that drive it."""
 
     def __init__(self, parts: Compliant, course: Course, wrench: np.ndarray | None) -> None:
         self.parts, self.course = parts, course

@@ -130,11 +130,7 @@ class AskedModel(ProgramModel):
 
 
 def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
-    """
-    Return what a correction does to one seam; a case that cannot be drawn says why.
-
-    seed, number: decide everything random in it.
-    """
+    """Return what a correction does to one seam; a case that cannot be drawn says why."""
     try:
         seam = sealed_seam(language, seed, number)
     except TwinError as error:
@@ -264,11 +260,7 @@ def ratio(entry: dict[str, Any], what: str = 'after') -> float:
 
 
 def counted(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """
-    Return what cases add up to.
-
-    cases: as `corrected_seam` returns them; those that could not be drawn are told apart.
-    """
+    """Return what cases of `corrected_seam` add up to; those that could not be drawn are told apart."""
     drawn = [case for case in cases if 'undrawn' not in case]
     outcomes = Counter(case['outcome'] for case in drawn)
     out: dict[str, Any] = {'cases': len(drawn), 'undrawn': len(cases) - len(drawn)}

@@ -184,11 +184,7 @@ def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
 
 
 def _eased(clock: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """
-    Return times, and how far along a way is then, as the time that takes at full speed [s].
-
-    clock: places of the way that are passed at one of the times, shape (N,) [s].
-    """
+    """Return times, and how far along a way of places at full speed, (N,), one is then [s]."""
     whole = float(clock[-1])
     rise = max(min(RISE, whole), 1e-9)
     end = whole + rise

@@ -273,11 +273,7 @@ def _splits(data: str) -> dict[str, Split]:
 
 
 def names(data: str) -> list[str]:
-    """
-    Return what can be judged: forty splits of two measured arms, and a servo axis.
-
-    data: directory with the sources.
-    """
+    """Return what can be judged: forty splits of two measured arms, and a servo axis."""
     return [*_splits(data), AXIS]
 
 

@@ -77,33 +77,18 @@ class Split:
 
 
 def all_splits(ur5: Path, ur10: Path) -> Iterator[Split]:
-    """
-    Yield the splits of both measured arms.
-
-    ur5, ur10: directories with the published tables.
-
-    Raises DataError: a table is missing or cannot be read.
-    """
+    """Yield the splits of both measured arms; raises DataError where a table is missing or broken."""
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         yield from splits(robot, stations(robot, directory), HOME[robot])
 
 
 def stations(robot: str, directory: Path) -> Recording:
-    """
-    Return the stations of one of the two arms, in the order they were measured.
-
-    Raises DataError: the table is missing or cannot be read.
-    """
+    """Return the stations of one of the two arms, in the order they were measured; or a DataError."""
     return read_table(directory / TABLES[robot], catalog.load(robot)).recording
 
 
 def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
-    """
-    Yield twenty splits of one arm's stations.
-
-    table: stations at rest, in the order they were measured.
-    first: stations before this one are left out.
-    """
+    """Yield twenty splits of one arm's stations, in the order they were measured, from the first on."""
     assert table.measured is not None
     rows = np.arange(first, table.measured.t.size)
     rng = np.random.default_rng(13)
@@ -288,11 +273,7 @@ def socket_robot(data: Path, arm: str) -> Robot:
 
 
 def places_of(data: Path, arm: str) -> tuple[str, ...]:
-    """
-    Return the places at which an arm was measured, in order of their names.
-
-    Raises DataError: there are none.
-    """
+    """Return the places where an arm was measured, by name; raises DataError where there are none."""
     folder = data / arm
     places = sorted(item.name for item in folder.glob('*') if (item / 'hole_0.csv').is_file())
     if not places:
@@ -301,11 +282,7 @@ def places_of(data: Path, arm: str) -> tuple[str, ...]:
 
 
 def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
-    """
-    Return the contacts of an arm at some places, as one recording.
-
-    arm: one of `ARMS`.
-    """
+    """Return the contacts of one of `ARMS` at some places, as one recording."""
     postures, labels = [], []
     contacts, ties = [], []
     for place in places:

@@ -36,12 +36,7 @@ ELSEWHERE = ('instrument', 'base', 'clock')
 
 
 def judged(data: str, name: str) -> dict[str, Any]:
-    """
-    Return what is reported of one row, and what unseen data say of it, as plain JSON values.
-
-    data: directory with the sources.
-    name: of a row.
-    """
+    """Return what is reported of one row, and what unseen data say of it, as plain JSON values."""
     plan = next(each for each in plans() if each.name == name)
     one = row(Path(data), plan)
     start = perf_counter()

@@ -28,11 +28,7 @@ returns the errors there (M, 3) [m], and their standard deviations where it has 
 
 
 def answer_of(case: ContestCase, learn: Learn, most: int | None = None) -> ContestAnswer:
-    """
-    Return the nominal arm plus what a learner adds; it names nothing.
-
-    most: samples that it learns from, spread evenly; left out, all.
-    """
+    """Return the nominal arm plus what a learner adds from most samples; it names nothing."""
     count = case.measured.t.size
     rows = np.unique(np.linspace(0, count - 1, most or count).astype(int))
     known = features(case.train.joints, case.measured.t[rows])

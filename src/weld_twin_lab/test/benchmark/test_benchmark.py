@@ -11,8 +11,8 @@ import pytest
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.errors import DataError
+from weld_twin_lab.benchmark.all_races import written_out
 from weld_twin_lab.benchmark.arms import DH_KEYS, calibrated_arm, links, random_positions
-from weld_twin_lab.benchmark.kinematics import written_out
 from weld_twin_lab.benchmark.peers import find_peers
 from weld_twin_lab.benchmark.race import LEFT_OUT, OWN, Contender, Outcome, Workload, race, short
 from weld_twin_nodes.cli import main

@@ -7,15 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weld_twin_lab.campaigns.poor_recordings import (
-    ALIGNS,
-    ERRORS,
-    ROBOTS,
-    Draw,
-    drawn,
-    recording_of,
-    tried,
-)
+from weld_twin_lab.campaigns.fuzz import ALIGNS, ERRORS, ROBOTS, Draw, drawn, recording_of, tried
 
 DRAWS = 8
 """Recordings drawn; `weld-twin lab campaign fuzz --recordings 3000` draws thousands."""

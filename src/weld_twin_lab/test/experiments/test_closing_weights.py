@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weld_twin_lab.experiments.closing_weights import heard, page, reached, unseen, weights
+from weld_twin_lab.experiments.study import closing_page as page
+from weld_twin_lab.experiments.study import heard, reached, unseen, weights
 from weld_twin_nodes.offline.investigation import AGAINST, BEGIN, FOR, OWN
 
 KEPT = Path(__file__).parents[4] / 'docs/results/investigate/learned.json'

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_lab.programs.cells import CELLS, robots_of
 from weld_twin_lab.programs.corrections import counted, page, path_accuracy, totals
 from weld_twin_lab.programs.plain_controller import driven, tool_pose
+from weld_twin_lab.programs.sealed_seams import CELLS, robots_of
 
 
 def seam(after, outcome='corrected', language='krl', before=2e-4, true=1e-5):

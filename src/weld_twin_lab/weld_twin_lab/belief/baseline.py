@@ -275,7 +275,7 @@ class GrowingStep(NamedTuple):
 
 
 def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
-    """Yield every right cause of a row of `grown` that was sure, and what a recording more made of it."""
+    """Yield every right cause of a row that was sure, and what a recording more made of it."""
     truth = row['truth']
     for effect, joint in truth['sites']:
         alike = alike_by_structure(truth['robot'], (effect, joint))

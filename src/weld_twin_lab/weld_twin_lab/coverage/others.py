@@ -26,10 +26,9 @@ from ..blind.cause_sizes import AT_REST, Cause, draw, scaled
 from ..blind.recorded_motion import RATE
 from ..fleet.years import CHECKS, base, cheap_year
 from ..plant.tracker import Tracker
-from ..programs.cells import CELLS
 from ..programs.corrections import promised_and_true, seam_driven
 from ..programs.plain_controller import evenly
-from ..programs.sealed_seams import BARE, sealed_seam
+from ..programs.sealed_seams import BARE, CELLS, sealed_seam
 from .held import twin_for
 from .sealed import of_drawn, of_motion, on_an_arm
 

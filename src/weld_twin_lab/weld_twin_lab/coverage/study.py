@@ -32,7 +32,7 @@ from ..blind.blind_cell import at_stations
 from ..blind.cause_sizes import small_errors
 from ..blind.displacement import rms
 from ..plant.tracker import Tracker
-from ..programs.cells import CELLS
+from ..programs.sealed_seams import CELLS
 from ..real_arms.sources import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
 from ..study import Study, head, require_simulator, tabled

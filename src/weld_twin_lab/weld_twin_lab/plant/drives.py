@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import rollout
+from . import mujoco_model
 from .exponentials import Course, Entry
 from .textbook_effects import Causes
 
@@ -37,7 +37,7 @@ def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline
     shaking = list(causes.of('vibration'))
     if course.command.static or not (lag.any() or shaking):
         return None
-    t = rollout.grid(course.command.t[0], course.command.t[-1], STEP)
+    t = mujoco_model.grid(course.command.t[0], course.command.t[-1], STEP)
     q, qdd = course.q(t), course.q(t, 2)
     gap = np.zeros_like(q)
     rotors = sorted(set(np.flatnonzero(lag)) | {causes.joint(item['joint']) for item in shaking})
@@ -51,8 +51,8 @@ def displacement(causes: Causes, course: Course, richness: float) -> CubicSpline
         if lag[i]:
             force[:, 0] = model.jnt_stiffness[0] * q[:, i]
         else:
-            force[:, 0], velocity[0] = rollout.follow(q[:, i], STEP)
-        path = rollout.run(model, start, velocity, force)
+            force[:, 0], velocity[0] = mujoco_model.follow(q[:, i], STEP)
+        path = mujoco_model.simulate(model, start, velocity, force)
         if lag[i]:
             gap[:, i] += path[:, 0] - q[:, i]
         for item, x in zip(own, path[:, 1:].T, strict=True):
@@ -72,12 +72,12 @@ def _rotor(
     spec.option.timestep = STEP
     spec.option.gravity = [0.0, 0.0, 0.0]
     rotor = _wheel(spec.worldbody)
-    options = rollout.follower()
+    options = mujoco_model.follower()
     if lag:
         loop = 1.0 / (LOOP_SHARE * richness * lag + 1e-6)
         options |= {
-            'stiffness': [rollout.HEAVY * loop / lag, 0.0, 0.0],
-            'damping': [rollout.HEAVY * loop, 0.0, 0.0],
+            'stiffness': [mujoco_model.HEAVY * loop / lag, 0.0, 0.0],
+            'damping': [mujoco_model.HEAVY * loop, 0.0, 0.0],
         }
     rotor.add_joint(axis=[0, 0, 1], **options)
     for item, reach in zip(shaking, swing, strict=True):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import compliance, drives, exponentials, flaws, rollout, tree
+from . import compliance, drives, exponentials, flaws, mujoco_model, tree
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant, Pedestal
@@ -61,7 +61,7 @@ class _Cell:
     def grid(self) -> np.ndarray:
         """The instants at which the moving arm is simulated [s]."""
         times = self.course.command.t
-        return rollout.grid(times[0], times[-1], tree.STEP)
+        return mujoco_model.grid(times[0], times[-1], tree.STEP)
 
     @cached_property
     def geared(self) -> np.ndarray:

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import exponentials, mujoco_model, rollout
+from . import exponentials, mujoco_model
 from .compliance import HARDENING, Compliant
 
 Course = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -60,7 +60,7 @@ def moving(
     if parts.richness <= 0.0:
         return parts.at_rest(q, wrench)
     tree = Tree(parts, (q, motor(t, 1), motor(t, 2)), wrench)
-    path = rollout.run(tree.model, *tree.drive(), tree.pull(wrench))
+    path = mujoco_model.simulate(tree.model, *tree.drive(), tree.pull(wrench))
     out = np.zeros_like(q)
     for dof, i in (*tree.gaps.items(), *tree.springs.items()):
         out[:, i] += path[:, dof]
@@ -90,7 +90,7 @@ class Tree:
         at = exponentials.home(parts.arm)
         motors, gaps, springs, dof = {}, {}, {}, 0
         for i, body in enumerate(mujoco_model.add_links(spec, parts.robot, parts.arm, parts.load)):
-            mujoco_model.add_hinge(body, parts.arm, at, i, f'motor{i}', **rollout.follower())
+            mujoco_model.add_hinge(body, parts.arm, at, i, f'motor{i}', **mujoco_model.follower())
             motors[dof], dof = i, dof + 1
             if parts.width[i] > 0.0:
                 self._add_gap(spec, body, at, i)
@@ -187,7 +187,7 @@ class Tree:
         position, velocity = np.zeros((2, self.model.nv))
         for dof, i in self.motors.items():
             position[dof] = q[0, i]
-            force[:, dof], velocity[dof] = rollout.follow(q[:, i], STEP)
+            force[:, dof], velocity[dof] = mujoco_model.follow(q[:, i], STEP)
         for dof, i in self.gaps.items():
             force[:, dof] = -(1.0 - UNBALANCED) * self._fine(self.tau[:, i])
         for dof, i in self.springs.items():

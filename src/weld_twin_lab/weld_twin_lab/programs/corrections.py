@@ -45,9 +45,8 @@ from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.recorded_motion import RATE
 from ..study import Study, engine_digest, head, require_simulator, tabled
-from .cells import CELLS, reader_of
 from .plain_controller import REST, Driven, driven, evenly, tool_pose
-from .sealed_seams import MEASURING, SealedSeam, drawn_as, sealed_seam
+from .sealed_seams import CELLS, MEASURING, SealedSeam, drawn_as, reader_of, sealed_seam
 
 APART = 1e-3
 """Places of the command path are looked at so far apart [m]: what turns around takes a few of them."""

@@ -22,7 +22,7 @@ from weld_twin_msgs_py.tables import read_table
 from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
 from ..study import Study
-from .splits import alone
+from .sources import alone
 from .unseen import ALIGN, PLAIN, plain_fit, residual
 
 WAYS = ('frames', 'geometry', 'statics', 'efforts')

@@ -63,31 +63,22 @@ class Candidate:
     """A measurement that could be made."""
 
     kind: str
-    sentence: str
-    """The sentence has ``{count}`` where the number of stations goes."""
-    set_up: float
-    """What has to be changed in the cell first [min]."""
-    recordings: tuple[Recording, ...]
-    """Motions, with side signals, without measurements."""
-    pieces: tuple[Piece, ...]
-    """What is chosen from."""
-    model: Model
-    """As the cell will be, without found effects; one base."""
-    room: Room
-    """Where the arm may go."""
-    whole: bool = False
-    """Whether none of the pieces may be left out."""
+    sentence: str  # the sentence has ``{count}`` where the number of stations goes
+    set_up: float  # what has to be changed in the cell first [min]
+    recordings: tuple[Recording, ...]  # motions, with side signals, without measurements
+    pieces: tuple[Piece, ...]  # what is chosen from
+    model: Model  # as the cell will be, without found effects; one base
+    room: Room  # where the arm may go
+    whole: bool = False  # whether none of the pieces may be left out
     new_base: bool = False
     new_tool: bool = False
     """Whether the instrument or the tool is set up anew, so that its frame is not known."""
-    alone: int = 0
-    """How many of the pieces, at the end, move one joint alone."""
+    alone: int = 0  # how many of the pieces, at the end, move one joint alone
     changed: str = ''
     """What is changed in the cell, in the words that a diagnosis takes; empty for nothing."""
 
     @property
     def static(self) -> bool:
-        """Return whether the arm is at rest while it is measured."""
         return self.recordings[0].joints.static
 
 

@@ -50,10 +50,8 @@ class Plan:
     chosen: tuple[int, ...]
     score: float = 0.0
     """Sum over the explanations of what it adds, in standard deviations, no more than decides."""
-    named: int = 1
-    """So many explanations, the first ones, are named by the verdict."""
-    others: tuple[int, ...] = ()
-    """Explanations that the first one is to be parted from."""
+    named: int = 1  # so many explanations, the first ones, are named by the verdict
+    others: tuple[int, ...] = ()  # explanations that the first one is to be parted from
     known: Array = field(default_factory=lambda: np.zeros(0))
     gains: Array = field(default_factory=lambda: np.zeros(0))
     """How far the data at hand part it from them, and what is added."""
@@ -76,7 +74,6 @@ class Plan:
 
     @property
     def before(self) -> float:
-        """Return how far the data at hand part that one."""
         return float(self.known[self._most])
 
     @property
@@ -115,7 +112,6 @@ class Plan:
 
     @property
     def _step(self) -> float:
-        """Return the time from station to station [s]."""
         t = self.candidate.recordings[0].joints.t
         return float(t[1] - t[0]) if t.size > 1 else STAY
 
@@ -125,7 +121,6 @@ class Plan:
         return self.candidate.set_up + self.robot_minutes
 
     def motion(self) -> JointMotion:
-        """Return the pieces one after the other."""
         pieces = [self.candidate.pieces[k] for k in self.chosen]
         if self.candidate.static:
             joints = self.candidate.recordings[0].joints

@@ -100,11 +100,7 @@ def next_experiment(
 def confirming(
     problem: Problem, model: Model, joints: Sequence[str], limits: Limits
 ) -> dict[str, Any]:
-    """
-    Return the measurement that shows whether an answer holds once all joints move widely.
-
-    It is as `next_experiment` returns it, with 'confirms': the joints that did not.
-    """
+    """Return the measurement that shows if an answer holds once joints, its 'confirms', move widely."""
     options = list(candidates(problem, model, limits, joints))
     reason = _NARROW.format(joints=', '.join(joints))
     return _entry(widening(problem, options, limits), reason, model) | {'confirms': list(joints)}
@@ -235,7 +231,6 @@ def _entry(
 
 
 def motion_entry(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
-    """Return a motion as plain numbers and strings."""
     t, q = joints.t, joints.q
     if not joints.static:
         t = np.linspace(0.0, t[-1], int(np.ceil(t[-1] / _PACE)) + 1)

@@ -72,18 +72,12 @@ class _Touchable:
 class Design:
     """What is known of the unknowns: errors of the arm first, then places."""
 
-    model: Model
-    """With every error that takes part."""
-    tool: bool
-    """Whether the tool point is among the unknowns."""
-    sigma: float
-    """Noise of a touch [m]."""
-    errors: int
-    """Number of unknowns that are no place."""
-    starts: tuple[int, ...]
-    """First unknown of every place."""
-    surfaces: tuple[Places, ...]
-    """Where contacts are."""
+    model: Model  # with every error that takes part
+    tool: bool  # whether the tool point is among the unknowns
+    sigma: float  # noise of a touch [m]
+    errors: int  # number of unknowns that are no place
+    starts: tuple[int, ...]  # first unknown of every place
+    surfaces: tuple[Places, ...]  # where contacts are
     root: Array
     """Its product with its transpose is the covariance of the unknowns, shape (P, P). Kept instead
     of it: with errors of micrometres and places that may be anywhere, rounding would make it
@@ -174,11 +168,7 @@ def scatter(touches: Sequence[_Touchable], errors: int) -> Array:
 def chosen(
     design: Design, rows: Array, weight: Array, count: int
 ) -> tuple[list[int], list[Design]]:
-    """
-    Return which touches to make, in order, and what is known after each.
-
-    Of the rows (N, 3, P) of all that could be made; the weight (E, E) is how much variances count.
-    """
+    """Return which touches (N, 3, P) to make, in order, by weights (E, E), and what each leaves open."""
     free = np.ones(len(rows), dtype=bool)
     order: list[int] = []
     after: list[Design] = []
@@ -218,8 +208,7 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
     Yield further touches of every place that can be reached: its number, and a recording.
 
     The joints stay within the recorded range, a little widened, and the tool leans no further than
-    it has
-    leaned there: what holds the artefact is not known.
+    it has leaned there: what holds the artefact is not known.
     """
     for k, recording in enumerate(problem.recordings):
         contacts, measured = recording.touched, recording.seen
@@ -401,7 +390,6 @@ def _sizes(design: Design, effects: Sequence[Effect], disputed: set[tuple[str, .
 
 
 def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> dict[str, Any]:
-    """Return the proposal as plain numbers and strings."""
     rows, touches, place = best.order[:_COUNT], best.touches, best.place
     q = np.concatenate([each.recording.joints.q for each in touches])[rows]
     labels = [label for each in touches for label in each.recording.touched.labels]

@@ -110,7 +110,6 @@ class Room:
         )
 
     def free(self, q: Array) -> Array:
-        """Return which postures, shape (N, n), are free, shape (N,), bool."""
         return self._space.free(q)
 
     def passed(self, q: Array) -> bool:
@@ -121,8 +120,7 @@ class Room:
         """
         Return free postures that fill the range evenly, as far as there are, (count, n).
 
-        The way from home to each is free too. ``skip`` are left out, so that later experiments go
-        elsewhere.
+        The way from home to each is free too; later experiments ``skip`` some to go elsewhere.
         """
         unit = halton(self._robot.n, skip + _DRAWN * count)[skip:]
         q = self.low + unit * (self.high - self.low)
@@ -191,11 +189,7 @@ _LEAST = 0.35
 
 
 def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
-    """
-    Return the least and the most of every joint that a touch uses, shape (n,) each.
-
-    The recorded range, a little wider, within the limits.
-    """
+    """Return the least and most of every joint that a touch uses: as recorded, a little wider, (n,)."""
     q = np.concatenate([r.joints.q for r in problem.recordings])
     middle = (q.min(axis=0) + q.max(axis=0)) / 2.0
     half = np.maximum(_REACH / 2.0 * np.ptp(q, axis=0), _LEAST)

@@ -49,8 +49,7 @@ class Side:
     predicted: list[Array]
     columns: list[Array]
     names: list[list[str]]
-    rows: int
-    """Scalar rows per sample."""
+    rows: int  # scalar rows per sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +64,7 @@ class Parting:
     now: list[Array]
     """Normal matrix of the columns of the one that is not true and, last, of the difference, shape
     (P, P)."""
-    pieces: list[Array]
-    """The same of every piece, shape (K, P, P)."""
+    pieces: list[Array]  # the same of every piece, shape (K, P, P)
 
     @cached_property
     def before(self) -> Array:

@@ -44,12 +44,7 @@ def rows_of(labels: Array) -> list[Rows]:
 
 
 class MovedJoint:
-    """
-    What one joint does to the tool, whitened; all columns that move this joint share it.
-
-    row: shape (rows,).
-    first: the first row of every sample, shape (samples,).
-    """
+    """What one joint does to the tool, whitened, (rows,); ``first`` row of every sample, (samples,)."""
 
     def __init__(self, row: Array, first: Index) -> None:
         self.row, self.first = row, first
@@ -97,16 +92,13 @@ class Piece:
     each: Array
     """By how much each moves the joint at every sample, shape (K, samples) [rad or m], or (K,
     rows); whitened and written out without one."""
-    joint: MovedJoint | None = None
-    """The joint that all of them move."""
+    joint: MovedJoint | None = None  # the joint that all of them move
 
     @property
     def count(self) -> int:
-        """Return how many there are."""
         return len(self.each)
 
     def written_out(self) -> Array:
-        """Return the columns, shape (K, rows)."""
         return self.each if self.joint is None else self.joint.spread_out(self.each)
 
     def products(self, rows: Array) -> Array:
@@ -132,7 +124,7 @@ class Piece:
         return np.asarray(size.max(axis=1, initial=0.0))
 
     def mixed(self, weights: Array) -> Array:
-        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
+        """Return sums of them with weights (..., K), as shape (..., rows)."""
         out = weights @ self.each
         return np.asarray(out if self.joint is None else self.joint.spread_out(out))
 
@@ -175,11 +167,9 @@ class Columns:
 
     @property
     def count(self) -> int:
-        """Return how many columns there are."""
         return int(self.places[-1].stop)
 
     def written_out(self) -> Array:
-        """Return the columns, shape (P, rows)."""
         return np.concatenate([piece.written_out() for piece in self.pieces])
 
     def normal(self) -> Array:
@@ -225,12 +215,7 @@ class Columns:
 
 
 class Maker:
-    """
-    Makes the columns of effects at a model.
-
-    features: of every recording, at the model.
-    scale: what the rows are divided by.
-    """
+    """Makes columns of effects by the features of every recording at a model, divided by a scale."""
 
     def __init__(self, problem: Problem, features: list[Features], scale: Scale) -> None:
         self.problem, self.features, self.scale = problem, features, scale
@@ -253,7 +238,6 @@ class Maker:
         return Piece(self.problem.whitened(parts, self.scale))
 
     def moved(self, joint: int) -> MovedJoint:
-        """Return what a joint does to the tool."""
         if joint not in self._joints:
             columns = enumerate(maker.column(('q', joint)) for maker in self.features)
             parts = [self.problem.seen(k, column) for k, column in columns]
@@ -264,11 +248,7 @@ class Maker:
 
 
 def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
-    """
-    Return the joint that is all that some features move; None where they move something else.
-
-    shifts: the features of one effect in every recording; see `Features.shifts`.
-    """
+    """Return the joint that one effect's features, of every recording, all move; None if any other."""
     channels = {channel for parts in shifts for shift in parts for channel in shift}
     if len(channels) != 1:
         return None
@@ -277,11 +257,7 @@ def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
 
 
 def designed(problem: Problem, model: Model, scale: Scale, framed: Model | None = None) -> Columns:
-    """
-    Return the whitened columns of frames, then of the found effects, of a model.
-
-    framed: the model at which frames have their columns; the same when left out.
-    """
+    """Return the whitened columns of frames (at another model, if one is given) and found effects."""
     features = problem.features(model)
     around = features if framed is None else problem.features(framed)
     frames = Piece(problem.whitened(problem.frame_columns(around)[0], scale))
@@ -300,10 +276,9 @@ def columns_covariance(
     hang together within a fold or differ between folds [1]_, each coefficient by the
     larger; they hang together as their columns do.
 
-    columns: p whitened columns.
     ridge: prior precision, shape (P,).
     residual: what the fit leaves, whitened, shape (rows,).
-    labels: fold of every row, some `BLOCKS` in all, shape (rows,).
+    labels: fold of every row, some `BLOCKS` in all.
     share: of the rows that count as independent.
 
     References
@@ -323,11 +298,7 @@ def columns_covariance(
 
 
 def unit_inverse(columns: Columns, ridge: Array) -> tuple[Array, Array]:
-    """
-    Return the inverse of the normal matrix with ones on its diagonal, and the norms of its columns.
-
-    ridge: prior precision, shape (P,).
-    """
+    """Return the inverse of the normal matrix, ridge (P,) added, at unit diagonal; norms of columns."""
     normal = columns.normal()
     normal[np.diag_indices_from(normal)] += ridge
     scaled, size = unit_diagonal(normal)

@@ -45,11 +45,7 @@ def inverted(matrix: Array) -> Array:
 
 
 def inverse_of(root: Array) -> Array:
-    """
-    Return the inverse of a matrix by its root, which is overwritten, shape (P, P).
-
-    root: as `root_of` returns it.
-    """
+    """Return the inverse (P, P) of a matrix by its root, as of `root_of`, which is overwritten."""
     lower = dpotri(root, lower=1, overwrite_c=1)[0]
     out: Array = lower + lower.T  # above its diagonal the root is empty
     diagonal = np.einsum('ii->i', out)
@@ -59,10 +55,7 @@ def inverse_of(root: Array) -> Array:
 
 def root_of(matrix: Array, *, clean: bool = True) -> Array:
     """
-    Return the lower triangle L of a matrix L L', in its place.
-
-    matrix: symmetric, in C order, shape (P, P); overwritten.
-    clean: what is above the triangle is empty, and not left as it was.
+    Return the lower triangle L of a matrix L L' in C order, in its place, empty above if ``clean``.
 
     Raises LinAlgError: the matrix is not positive definite.
     """
@@ -75,11 +68,9 @@ def root_of(matrix: Array, *, clean: bool = True) -> Array:
 
 def factored(matrix: Array) -> Callable[[Array], Array]:
     """
-    Return what solves for one right-hand side, shape (P,), or several, shape (P, R).
+    Return what solves for right-hand sides, (P,) or (P, R), by the factor in place of the matrix.
 
-    matrix: symmetric, in C order, shape (P, P); overwritten.
-
-    Raises LinAlgError: the matrix is not positive definite.
+    Raises LinAlgError: the matrix, in C order, is not positive definite.
     """
     if not matrix.size:
         return np.array
@@ -92,11 +83,7 @@ def factored(matrix: Array) -> Callable[[Array], Array]:
 
 
 def well_conditioned(matrix: Array, least: float) -> bool:
-    """
-    Return whether the least eigenvalue is above a share of the largest for certain.
-
-    matrix: symmetric, shape (P, P).
-    """
+    """Return whether the least eigenvalue is above a share of the largest for certain."""
     factor, failed = dpotrf(matrix.T, lower=1, clean=0)
     if failed:
         return False
@@ -106,10 +93,7 @@ def well_conditioned(matrix: Array, least: float) -> bool:
 
 def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
     """
-    Return the solution and the diagonal of the inverse, shapes (P,).
-
-    matrix: symmetric, in C order, shape (P, P); overwritten.
-    right: shape (P,).
+    Return the solution and the diagonal of the inverse, (P,) each; overwrites the matrix, in C order.
 
     Raises LinAlgError: the matrix is not positive definite.
     """
@@ -121,12 +105,11 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
 
 def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
     """
-    Return a normal matrix with ones on its diagonal, (P, P), and the norms of its columns, (P,).
+    Return a normal matrix with ones, and damping, on its diagonal, and the norms of its columns.
 
-    Solve ``normal / outer(size, size)`` for ``right / size`` and divide by ``size``.
-
-    normal: shape (P, P).
-    damping: added to the diagonal of ones, so that columns that repeat others do no harm.
+    Solve ``normal
+    outer(size, size)`` for ``right
+    size`` and divide by ``size``.
     """
     size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
     scaled = normal / (size[:, None] * size)
@@ -136,11 +119,7 @@ def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
 
 
 def span_of(columns: Array) -> Array:
-    """
-    Return orthonormal rows that span columns, (P, rows), of any size, which may repeat each other.
-
-    columns: shape (P, rows).
-    """
+    """Return orthonormal rows that span columns (P, rows), of any size, which may repeat each other."""
     size = np.linalg.norm(columns, axis=1)
     shown = columns[size > 0.0] / size[size > 0.0, None]
     if not shown.size:

@@ -77,20 +77,17 @@ class Fit:
     """A fitted model."""
 
     model: Model
-    residual: Array
-    """Whitened residual at the solution, shape (rows,)."""
+    residual: Array  # whitened residual at the solution, shape (rows,)
     prepared: list[Any] = field(default_factory=list, init=False, repr=False)
     """What was last prepared of it for unseen stretches, as several steps ask for the same. It
     lies here, and goes with the fit: it holds the fit itself."""
 
     @property
     def rss(self) -> float:
-        """Return the whitened sum of squares."""
         return float(self.residual @ self.residual)
 
     @cached_property
     def coordinates(self) -> Array:
-        """Return the fit coordinates of all found effects, shape (K,)."""
         return coordinates(self.model)
 
 
@@ -100,12 +97,7 @@ def design(problem: Problem, model: Model, scale: Scale) -> Array:
 
 
 def stepped(problem: Problem, model: Model, step: Array) -> Model:
-    """
-    Return the model after a step of frames and coordinates, in the order of `design`.
-
-    step: of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates,
-    shape (P,).
-    """
+    """Return the model after a step (P,) of frames (xyz, rotvec) and coordinates, as in `design`."""
     at = 0
     if 'base' in problem.align:
         for group in problem.stands:
@@ -149,12 +141,12 @@ def fit(
     """
     Return the most probable nuisance frames and coordinates of the found effects.
 
-    Least squares with the priors of machines and frames, by Levenberg-Marquardt on column-scaled normal
+    Least squares with the priors of machines and frames, by Levenberg-Marquardt on column-scaled
+    normal
     equations.
 
-    problem, model, scale: ``model`` is the start; its known effects stay as they are.
-    precision: prior precision of every effect coordinate, about zero, in whitened units, shape
-    (K,); that of machines at large when left out.
+    precision: of every effect coordinate about zero, in whitened units, shape (K,); that of machines
+    at large when left out.
     tolerance: stops when the objective falls by less than this share.
     most: stops where a step is predicted to leave more than this, whitened squares.
     """
@@ -174,11 +166,7 @@ def fit(
 def predict_fit(
     problem: Problem, model: Model, scale: Scale, columns: Columns
 ) -> tuple[Array, float]:
-    """
-    Return the whitened residual of a model, and about the sum of squares that its fit will leave.
-
-    columns: of its frames and found effects, at a model close by.
-    """
+    """Return a model's whitened residual, and about what a fit of it by columns close by will leave."""
     start = _Point.at(problem, model, scale, effect_precision(model))
     normal, right = start.normal_equations(columns)
     return start.residual, start.cost - float(right @ solve_scaled(normal, right, DAMPING))
@@ -187,7 +175,6 @@ def predict_fit(
 def _descended(
     start: _Point, columns: Columns, iterations: int, tolerance: float, most: float
 ) -> _Point:
-    """Return the place that Levenberg and Marquardt lead to from a start with its columns."""
     here, damping = start, DAMPING
     for _ in range(iterations):
         there, (normal, right) = None, here.normal_equations(columns)
@@ -228,7 +215,6 @@ class _Point:
 
     @classmethod
     def at(cls, problem: Problem, model: Model, scale: Scale, prior: Array) -> _Point:
-        """Return the cost of a model under a prior about zero, shape (K,)."""
         residual = problem.whitened(problem.residuals(model), scale)
         frames, off = frame_prior(problem, model)
         ridge = np.concatenate([frames, prior])
@@ -243,7 +229,6 @@ class _Point:
         return replace(self, ridge=ridge, cost=cost, share=share)
 
     def columns(self) -> Columns:
-        """Return the columns of frames and effects here."""
         return designed(self.problem, self.model, self.scale)
 
     def normal_equations(self, columns: Columns) -> tuple[Array, Array]:
@@ -254,7 +239,6 @@ class _Point:
         return normal, right
 
     def stepped(self, step: Array) -> _Point:
-        """Return the model after a step of frames and coordinates."""
         model = stepped(self.problem, self.model, step)
         there = _Point.at(self.problem, model, self.scale, self.prior)
         return there if self.share == 1.0 else there.believing(self.share)
@@ -274,13 +258,7 @@ class _Point:
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
-    """
-    Return the solution of damped, column-scaled normal equations; flat directions stay put.
-
-    normal: columns times columns, shape (P, P).
-    right: columns times residual, shape (P,).
-    damping: added to the unit diagonal of the scaled equations.
-    """
+    """Return the solution of column-scaled normal equations, damped; flat directions stay put."""
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     live = size > ROUNDING * max(size.max(initial=0.0), EMPTY)
     out = np.zeros(right.size)
@@ -301,10 +279,8 @@ def robust_scale(
     """
     Return the noise of residuals by median absolute deviation, and Huber weights per sample.
 
-    residuals: shape (c, M).
     least: never return less noise than this.
-    freedom: coordinates that the residuals' own data determined; they took their share of the
-    noise.
+    freedom: coordinates that the residuals' own data determined; they took their share of the noise.
     """
     given = problem.given_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, given, strict=True)]
@@ -343,9 +319,6 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
     All but outliers, and of those no more than `SET_ASIDE` (or a few) are left out, the farthest:
     what many samples do is structure, and must show in what is left. Strays, each by itself and
     farther off than any structure, are left out all the same: one would be the whole RMS.
-
-    weights: of every sample of every recording, as a robust fit gives them, shape (M,).
-    few: outliers that may be left out however few samples there are.
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
     far = sum(int(part.sum()) for part in strays(weights, (HUBER / STRAY) ** 2))
@@ -377,14 +350,7 @@ def without_strays(scale: Scale) -> Scale:
 def robust_fit(
     problem: Problem, model: Model, precision: Array | None = None, rounds: int = 2
 ) -> tuple[Fit, Scale]:
-    """
-    Return a fit and the noise and weights that go with it, by reweighting a few times.
-
-    The first weights are by what the model leaves as it is.
-
-    precision: prior precision of the fit coordinates, shape (K,); left out, there is no prior.
-    rounds: how often the weights are taken anew.
-    """
+    """Return a fit, reweighted a few times from what the model leaves as it is, and its scale."""
     scale = robust_scale(problem, problem.residuals(model))
     result = fit(problem, model, scale, precision)
     for _ in range(rounds):
@@ -399,7 +365,6 @@ def with_weights(scale: Scale, problem: Problem) -> Scale:
 
 
 def effect_precision(model: Model) -> Array:
-    """Return the prior precision of every effect coordinate about zero, shape (K,)."""
     parts = [spreads(model.robot, effect) for effect in model.found]
     return np.asarray(np.concatenate([np.zeros(0), *parts]) ** -2.0) if parts else np.zeros(0)
 
@@ -436,13 +401,7 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
 
 
 def frame_offset(now: Array, was: Array, *, left: bool) -> Array:
-    """
-    Return the step (xyz, rotvec) that leads from one frame to another, as `Model.moved` does.
-
-    now: the frame that the step leads to, shape (4, 4) [m].
-    was: the frame that it starts from, shape (4, 4) [m].
-    left: the turn is about the axes outside (a base), else about its own (a tool).
-    """
+    """Return the step (xyz, rotvec) between frames; a base turns about axes outside (``left``)."""
     one, other = now[:3, :3], was[:3, :3]
     turn = one @ other.T if left else other.T @ one
     return np.concatenate([now[:3, 3] - was[:3, 3], rotation_vector(turn)])

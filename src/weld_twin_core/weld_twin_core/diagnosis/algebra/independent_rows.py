@@ -21,9 +21,6 @@ def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, 
 
     Initial positive sequence estimate [1]_ on every component of every recording.
 
-    residual: whitened, as `Problem.whitened` lays it out, shape (rows,).
-    rows, samples: components and samples of every recording.
-
     References
     ----------
     .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statist. Sci. 7, 1992.
@@ -57,12 +54,7 @@ def by_sample(
     rows: tuple[int, ...],
     samples: tuple[int, ...],
 ) -> list[np.ndarray[tuple[int, ...], np.dtype[Row]]]:
-    """
-    Return what is laid out in rows as one array per recording, shape (M, c, ...).
-
-    values: as `Problem.whitened` lays it out, shape (rows, ...).
-    rows, samples: components c and samples M of every recording.
-    """
+    """Return rows, (rows, ...), as `Problem.whitened` lays them out, by recording, (M, c, ...)."""
     ends = np.cumsum([c * m for c, m in zip(rows, samples, strict=True)])
     parts = np.split(values, ends[:-1])
     return [
@@ -81,11 +73,7 @@ NOT_MEASURED = 1e-6
 
 
 def measured_axes(part: Array) -> Array:
-    """
-    Return the coordinates that were measured, shape (k, M) of (3, M).
-
-    A linear axis has nothing across it: exact zeros there are no sign of small noise.
-    """
+    """Return the coordinates (k, M) of (3, M) that were measured: exact zeros are no small noise."""
     size = np.abs(part).max(axis=1, initial=0.0)
     live = size > NOT_MEASURED * size.max(initial=0.0)
     return part[live] if live.any() else part

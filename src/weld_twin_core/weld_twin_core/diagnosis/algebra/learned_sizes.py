@@ -44,11 +44,10 @@ def learned_precision(
 
     The freedom counts the coordinates that the data determine rather than the prior.
 
-    normal, right, rss, rows: normal equations of the coordinates with the nuisance frames
-    projected out.
+    normal, right, rss, rows: normal equations with the nuisance frames projected out.
     labels, scales: as `groups` returns them, shape (K,).
-    believed: precision of machines at large: the spread learned of this one starts there and is
-    never wider, and what is fitted freely has it, shape (K,). Nothing is believed when left out.
+    believed: precision of machines at large, shape (K,): the spread learned starts there and is
+    never wider, and what is fitted freely has it. Nothing is believed when left out.
     """
     if not scales.size:
         return np.zeros(0), 0.0
@@ -107,19 +106,13 @@ def _solved(
 
 
 def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: Array) -> Array:
-    """Return the precision of every coordinate in units of its typical size, shape (K,)."""
     if not variance.size:
         return np.asarray(1.0 / usual)
     return np.asarray(np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1.0 / usual))
 
 
 def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
-    """
-    Return normal equations with their leading columns projected out.
-
-    rss: sum of squares of the residual.
-    frames: how many columns lead.
-    """
+    """Return normal equations and squares with their leading columns, frames, projected out."""
     if not frames:
         return normal, right, rss
     cross = normal[:frames, frames:]

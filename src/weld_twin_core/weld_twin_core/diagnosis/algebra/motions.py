@@ -47,7 +47,6 @@ SEED = 1
 
 
 def hardly_moves(features: list[Features], effect: Effect) -> bool:
-    """Return whether an effect sits on a joint, or has a source, that hardly moves."""
     if effect.search.moved_by is None:
         return False
     robot = features[0].twin.robot
@@ -77,9 +76,6 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
     Where an effect of many shapes may be is looked for there: a recording in which the joint stands
     still shows none of them. Between stations nothing is seen: beside a motion hardly any of the way
     to each counts, or a dozen would seem to show more of a joint than a path does.
-
-    features: one for each recording.
-    joint: none for all joints.
     """
     if len(features) == 1:
         return 0
@@ -95,12 +91,7 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
 
 
 def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
-    """
-    Return causes in joints and links that depend on nothing but some quantities, at zero.
-
-    view: the samples that reach them.
-    on: what they may depend on: 'constant', 'load'.
-    """
+    """Return causes of no size in joints and links that depend on some quantities alone ('load')."""
     out: dict[tuple[str, ...], Effect] = {}
     for kind in REGISTRY.values():
         if kind.of not in ('joint', 'link') or not kind.traits.cause or kind.traits.dated:
@@ -112,7 +103,6 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
 
 
 def candidate_kinds(align: frozenset[str]) -> list[type[Effect]]:
-    """Return the kinds of effect that may be a cause, in the order of their stages."""
     kinds = [
         kind
         for kind in REGISTRY.values()
@@ -127,7 +117,6 @@ def constant(kind: type[Effect]) -> bool:
 
 
 def of_no_size(site: Site) -> Effect:
-    """Return an effect of no size at a site."""
     return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
 
 
@@ -140,11 +129,9 @@ def same_error(
     both: bool = False,
 ) -> bool:
     """
-    Return whether one of two constant errors can always do what the other does.
+    Return whether one of two constant errors can always do what the other does, or each (``both``).
 
-    one, other: their families and joints count, not their values.
-    align: frames that are fitted, 'base' and 'tool': what these take up distinguishes nobody.
-    both: ask that each can do what the other does.
+    What frames that are fitted take up distinguishes nobody; values do not count.
     """
     a, b = columns(robot, one), columns(robot, other)
     if align:
@@ -162,12 +149,7 @@ def same_error(
 def never_parted(
     robot: Robot, align: frozenset[str], sets: Sequence[Sequence[Site]]
 ) -> tuple[tuple[Site, ...], ...]:
-    """
-    Return which sites are one error on any motion, what a person can set first.
-
-    align: frames that are fitted, 'base' and 'tool'.
-    sets: what the data cannot tell apart.
-    """
+    """Return which sites of each set are one error on any motion, what a person can set first."""
     out = []
     for group in sets:
         known = [site for site in group if site.effect in REGISTRY]
@@ -187,13 +169,11 @@ def never_parted(
 @lru_cache(maxsize=4)
 def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) -> frozenset[Site]:
     """
-    Return the constant errors that are on any motion what a person can set, and are no such themselves.
+    Return the constant errors that are what a person can set, on any motion, and cannot be set.
 
     The tilt of an axis may be the zero of its joint whatever the motion: no measurement can decide,
-    mending one mends both, and the zero is what a controller takes.
-
-    align: frames that are fitted, 'base' and 'tool'.
-    exclude: families taken out of the library: nothing is set by them.
+    mending one mends both, and the zero is what a controller takes. Nothing is set by what is
+    excluded.
     """
     span = _frames(robot, align)
     singles = [e for e in _constants(robot) if e.fit.coordinates().size == 1]
@@ -209,7 +189,6 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
 
 
 def _constants(robot: Robot) -> Iterator[Effect]:
-    """Yield every error of no size that never changes."""
     for name, kind in REGISTRY.items():
         if constant(kind):
             for joint in joints_of(kind, robot):
@@ -218,12 +197,10 @@ def _constants(robot: Robot) -> Iterator[Effect]:
 
 
 def columns(robot: Robot, effect: Effect) -> Array:
-    """Return what an error does to the tool in many postures, one row per component."""
     return _levered(anywhere(robot).columns(effect))
 
 
 def _frames(robot: Robot, align: frozenset[str]) -> Array:
-    """Return what spans the motions of frames in many postures, shape (P, rows)."""
     maker, rows = anywhere(robot), [np.zeros((0, 6 * POSTURES))]
     for name in sorted(align):
         rows.append(_levered(np.stack([maker.column((name, k)) for k in range(6)])))

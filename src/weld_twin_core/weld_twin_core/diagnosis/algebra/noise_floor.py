@@ -32,10 +32,8 @@ show by itself, in repeats or differences, or be given with the data: a misfit l
 class NoiseFloor(NamedTuple):
     """What the instrument's noise alone would leave."""
 
-    sigma: float
-    """Standard deviation of one measured coordinate, [m]."""
-    independent: bool
-    """Whether repeats or differences in time showed it, not what a model left."""
+    sigma: float  # standard deviation of one measured coordinate, [m]
+    independent: bool  # whether repeats or differences in time showed it, not what a model left
 
     @property
     def rms_m(self) -> float:
@@ -50,7 +48,7 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
     residuals: of the best model at hand, shape (c, M). What it leaves bounds the floor from above;
     repeated stations and third differences in time, where the data have them, are not touched by
     its faults.
-    least: noise of a coordinate [m] that is believed all the same, where many coordinates take it up.
+    least: noise [m] that is believed all the same, where many coordinates take it up.
     """
     estimates = []
     independent = True
@@ -77,7 +75,6 @@ def spread_of(position: Array) -> float:
 
 
 def _differences(position: Array) -> float | None:
-    """Return the noise that third differences of neighbouring samples show: 1, -3, 3, -1."""
     if position.shape[1] < ENOUGH:
         return None
     third = np.diff(position, n=3, axis=1)
@@ -85,7 +82,6 @@ def _differences(position: Array) -> float | None:
 
 
 def _repeats(q: Array, position: Array) -> float | None:
-    """Return the noise that repeated stations show; None when too few were repeated."""
     if q.shape[0] != position.shape[1]:
         return None
     order = np.lexsort(np.round(q / SAME_STATION).T)

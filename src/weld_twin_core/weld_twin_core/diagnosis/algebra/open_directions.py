@@ -36,12 +36,7 @@ ROWS = 3000
 
 
 class Open(NamedTuple):
-    """
-    Directions that the data hardly show.
-
-    ``names`` are those of the frame columns; ``vectors``, (F, k), has steps of the frames [m, rad] as
-    columns.
-    """
+    """Directions that data hardly show: names of frame columns; steps [m, rad] as columns (F, k)."""
 
     names: list[str]
     vectors: Array
@@ -59,17 +54,9 @@ def shown(
     """
     Return how well the data show each direction of the aligned frames, the least first.
 
-    moving: leave out frame columns that move nothing at all.
-
-    Returns
-    -------
-    names : list of str
-        Of the F frame columns.
-    size : array, shape (F,) [m, rad]
-        Of an error that the data should show.
-    strength, vectors : array, shape (F,) and (F, F)
-        Errors of this size in units of the least noise, squared, and the directions in columns.
-
+    Names of the F frame columns, of those that move anything if ``moving``; sizes (F,) [m, rad] of an
+    error that the data should show; squared strengths of errors of this size in units of the least
+    noise, (F,), and the directions in columns, (F, F).
     """
     problem = problem.thinned(ROWS).of_frames()
     parts, names = problem.frame_columns(problem.features(model))
@@ -86,12 +73,7 @@ def shown(
 def keep_open_directions(
     result: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot
 ) -> Fit:
-    """
-    Return the fit with the open directions as they were given, where the data bear that.
-
-    ``precision``, (K,), is the prior precision of the found effects' coordinates, and may be
-    empty; ``given`` has the frames that were given.
-    """
+    """Return the fit with open directions as in the robot given, where the data bear that."""
     free = open_directions(problem, result.model)
     if not free.vectors.size:
         return result
@@ -130,7 +112,6 @@ def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:
 def _closed_step(
     problem: Problem, model: Model, scale: Scale, precision: Array, free: Open
 ) -> Array:
-    """Return a least-squares step, shape (P,), that leaves the open directions where they are."""
     columns = design(problem, model, scale)
     residual = problem.whitened(problem.residuals(model), scale)
     frames = len(free.names)
@@ -150,7 +131,6 @@ def _closed_step(
 
 
 def in_words(name: str) -> str:
-    """Return the name of a direction of a frame, as `shown` has it, as people read it."""
     frame, axis = name.split('.')
     kind, _, number = frame.partition(' ')
     which = '' if number in ('', '0') else f' of recording {int(number) + 1}'

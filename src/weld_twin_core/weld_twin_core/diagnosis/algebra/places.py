@@ -43,11 +43,9 @@ def posed(
     align: frozenset[str],
 ) -> Problem:
     """
-    Return the problem of what an instrument measured and of places that were touched.
+    Return the problem of what an instrument measured and of places touched, as of `by_place`.
 
-    touched: one for each place, as `by_place` parts them.
-    model: where frames start, with a base for each of both.
-    align: frames that are fitted; the base is not where nothing shows it.
+    The model has a base for each of both; none is fitted where nothing shows it.
     """
     filled = [_filled(part, model, k) for k, part in enumerate(touched, len(tracked))]
     anchor = Anchor(model.bases, model.robot.T_flange_tool)

@@ -38,10 +38,7 @@ of the other what only both together show."""
 
 def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[str]:
     """
-    Return the frames to fit along, from one text or from several names.
-
-    align: 'base', 'tool', 'base,tool', or the names as a list or a set; nothing for neither.
-    what: how the message names the argument.
+    Return the frames to fit along: 'base', 'tool', 'base,tool', or some names; ``what`` names them.
 
     Raises ModelError: a name is neither 'base' nor 'tool'.
     """
@@ -60,8 +57,7 @@ class Problem:
     """Each with measurements inside its joint stream; see `usable`."""
     align: frozenset[str] = field(default_factory=frozenset)
     """Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'."""
-    anchor: Anchor | None = None
-    """Where those frames are believed to be; see `fit.frame_prior`."""
+    anchor: Anchor | None = None  # where those frames are believed to be; see `fit.frame_prior`
     dated: tuple[Effect, ...] = ()
     """What may have set in at an instant that was found: hypotheses beside the library's."""
     changes: tuple[Change, ...] = ()
@@ -81,7 +77,7 @@ class Problem:
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
-        """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
+        """Return the rows per sample of each recording: 6 for poses, 3 for points; contacts differ."""
         seen = (self.contact(k) for k in range(len(self.recordings)))
         return tuple(
             (3 if r.seen.rotation is None else 6) if own is None else own.seen.shape[1]
@@ -90,7 +86,6 @@ class Problem:
 
     @property
     def at_rest(self) -> bool:
-        """Return whether all was measured at rest: stations, and no motion among them."""
         return all(recording.joints.static for recording in self.recordings)
 
     def contact(self, k: int) -> Unknowns | None:
@@ -104,12 +99,10 @@ class Problem:
 
     @property
     def places(self) -> int:
-        """Return the number of places that were touched."""
         return sum(own is not None for own in self.touched)
 
     @property
     def placed(self) -> bool:
-        """Return whether a place that was touched is known."""
         each = (r.contacts for r in self.recordings)
         return any(c is not None and c.artefact.known for c in each)
 
@@ -144,7 +137,6 @@ class Problem:
 
     @property
     def shared_count(self) -> int:
-        """Return the number of errors that samples of an instrument share, after the frames."""
         return sum(common.mean.size for _, common in self.common)
 
     @cached_property
@@ -183,12 +175,7 @@ class Problem:
         return replace(self, touched=tuple(each) if any(each) else ())
 
     def seen(self, k: int, block: Array) -> Array:
-        """
-        Return what recording k shows of changes of its poses, shape (..., c, M).
-
-        k: which recording, counted from 0.
-        block: shape (..., 6, M) [m, rad].
-        """
+        """Return what recording k shows, (..., c, M), of changes of its poses, (..., 6, M) [m, rad]."""
         own = self.contact(k)
         if own is not None:
             return np.asarray(np.einsum('mci,...im->...cm', own.seen, block[..., :3, :]))
@@ -210,7 +197,6 @@ class Problem:
 
     @cached_property
     def samples(self) -> tuple[int, ...]:
-        """Return the number of measurements of each recording."""
         return tuple(r.seen.t.size for r in self.recordings)
 
     @cached_property
@@ -231,7 +217,6 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """Return the number of scalar rows."""
         return sum(c * m for c, m in zip(self.rows, self.samples, strict=True))
 
     def residuals(self, model: Model) -> list[Array]:
@@ -287,8 +272,7 @@ class Problem:
         """
         Return residual-like parts, each (..., c, M), as one array (..., rows) in units of noise.
 
-        Rows run over recordings, then samples, then components, so that a stretch of time is a
-        stretch of rows.
+        Rows run over recordings, samples, components, so that a stretch of time is a stretch of rows.
         """
         out = []
         taken = self.places_taken(scale)
@@ -306,8 +290,8 @@ class Problem:
         """
         Return a residual-like part (..., c, M) of recording k in units of noise, (..., M, c).
 
-        Where an instrument tells how sure its poses are, rows are mixed until each is as sure as
-        a usual coordinate.
+        Poses whose instrument tells how sure they are have rows mixed until each is as sure as usual
+        ones.
         """
         unit = np.full(part.shape[-2], 1.0 / scale.position)
         unit[3:] = 1.0 / scale.orientation
@@ -331,7 +315,6 @@ class Problem:
         return out
 
     def by_sample(self, values: Array) -> list[Array]:
-        """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""
         return by_sample(values, self.rows, self.samples)
 
     def frame_columns(self, features: list[Features]) -> tuple[list[Array], list[str]]:
@@ -365,11 +348,7 @@ class Problem:
     def effect_columns(
         self, features: list[Features], effect: Effect, *, atoms: bool = True
     ) -> list[Array]:
-        """
-        Return an effect's columns, one (P, c, M) array per recording.
-
-        atoms: its linear features; else the derivatives by its fit coordinates.
-        """
+        """Return an effect's linear features, or its derivatives, (P, c, M) per recording."""
         return [self.seen(k, maker.columns(effect, atoms)) for k, maker in enumerate(features)]
 
     def block_labels(self, blocks: int) -> Array:
@@ -416,7 +395,6 @@ class Problem:
         return replace(self, recordings=tuple(out))
 
     def thinned_with(self, scale: Scale, most_rows: int) -> tuple[Problem, Scale]:
-        """Return `thinned`, and a scale with the weights that belong to it."""
         thin = self.thinned(most_rows)
         if thin is self:
             return self, scale
@@ -470,12 +448,10 @@ class Scale:
 
     @cached_property
     def roots(self) -> list[Array]:
-        """Return the square root of every weight."""
         return [np.sqrt(weight) for weight in self.weights]
 
     @property
     def left_out(self) -> list[NDArray[np.bool_]]:
-        """Return which samples are left out, (M,) per recording."""
         return [weight == 0.0 for weight in self.weights]
 
 
@@ -487,23 +463,19 @@ class Site(NamedTuple):
 
     @classmethod
     def of(cls, effect: Effect) -> Site:
-        """Return where an effect is at work."""
         return cls(effect.name, effect.site)
 
     def __str__(self) -> str:
-        """Return it as people read it."""
         return f'{self.effect} of {self.joint}' if self.joint else self.effect
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values in the public schema."""
         return self._asdict()
 
 
 class Change(NamedTuple):
     """What one recording has that the first has not, counted from the first."""
 
-    recording: int
-    """Counted from 0; never 0."""
+    recording: int  # counted from 0; never 0
     effect: Effect
 
 
@@ -518,11 +490,9 @@ class Alone(NamedTuple):
     unseen_m: float
     """RMS that remains with the file alone, where it was recorded and on data not fitted [m]."""
     whole_recorded_m: float
-    whole_unseen_m: float
-    """The same with the whole model [m]."""
+    whole_unseen_m: float  # the same with the whole model [m]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values."""
         return {**self._asdict(), 'changes': [effect.to_mapping() for effect in self.changes]}
 
 
@@ -531,21 +501,15 @@ class Model:
     """What is believed: the robot with its tool frame, a base frame per recording, and effects."""
 
     robot: Robot
-    bases: tuple[Array, ...]
-    """Shape (4, 4)."""
-    known: tuple[Effect, ...] = ()
-    found: tuple[Effect, ...] = ()
-    """Effects given by the user, and those this diagnosis put in."""
-    mended: tuple[str, ...] = ()
-    """What was wrong with the data it stands on, and was undone."""
-    changes: tuple[Change, ...] = ()
-    """What differs between the recordings."""
-    given: tuple[int, ...] = ()
-    """Of which of the recordings given each is a part; see `Problem`."""
+    bases: tuple[Array, ...]  # shape (4, 4)
+    known: tuple[Effect, ...] = ()  # given by the user
+    found: tuple[Effect, ...] = ()  # put in by this diagnosis
+    mended: tuple[str, ...] = ()  # what was wrong with the data it stands on, and was undone
+    changes: tuple[Change, ...] = ()  # what differs between the recordings
+    given: tuple[int, ...] = ()  # of which of the recordings given each is a part; see `Problem`
     mends: tuple[Mapping[str, Any], ...] = ()
     """How it was undone, as plain values to be made again; see `soundness.mending`."""
-    alone: Alone | None = None
-    """What its robot file does by itself; None where that is not known."""
+    alone: Alone | None = None  # what its robot file does by itself; None where that is not known
     named: tuple[tuple[str, str | None], ...] | None = None
     """Name and joint of the effects found that the verdict names; None before there is one."""
     common: tuple[Array, ...] = ()
@@ -555,12 +519,10 @@ class Model:
     """How the controller counts the joints, where a recording says that it does so otherwise."""
 
     def twin(self, k: int) -> Twin:
-        """Return the twin of recording k."""
         effects = self.known + self.found + self.changed(k)
         return Twin(self.robot.with_frames(base=self.bases[k]), effects)
 
     def changed(self, k: int) -> tuple[Effect, ...]:
-        """Return what recording k has that the first has not."""
         own = self.given[k] if self.given else k
         return tuple(change.effect for change in self.changes if change.recording == own)
 
@@ -602,11 +564,9 @@ class Model:
         return tuple(self.robot.joint_names[k] for k in negative.tolist())
 
     def without(self, k: int) -> Model:
-        """Return the model without found effect k."""
         return self.with_found(self.found[:k] + self.found[k + 1 :])
 
     def with_found(self, result: tuple[Effect, ...]) -> Model:
-        """Return the model with other found effects."""
         return replace(self, found=result)
 
 
@@ -622,9 +582,6 @@ def _moved(frame: Array, step: Array, *, left: bool) -> Array:
 class Anchor:
     """Where the frames are believed to be."""
 
-    bases: tuple[Array, ...]
-    """Shape (4, 4)."""
-    tool: Array
-    """Shape (4, 4)."""
-    of: frozenset[str] = frozenset({'base', 'tool'})
-    """Frames of which that is believed."""
+    bases: tuple[Array, ...]  # shape (4, 4)
+    tool: Array  # shape (4, 4)
+    of: frozenset[str] = frozenset({'base', 'tool'})  # frames of which that is believed

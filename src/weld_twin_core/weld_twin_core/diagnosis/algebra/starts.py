@@ -32,11 +32,7 @@ Tried = tuple[list[Effect], Array]
 
 
 def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Effect:
-    """
-    Return the instance of an effect from which to fit it beside those a model has.
-
-    The effect itself where its kind has no need of a search.
-    """
+    """Return where to fit an effect from, beside those of a model: itself if nothing is searched."""
     if not effect.fit.searched:
         return effect
     return _Looker.of(problem, model, scale).best(effect)
@@ -78,11 +74,9 @@ def _square(row: Array) -> float:
 
 def profile(problem: Problem, model: Model, scale: Scale, k: int) -> Tried | None:
     """
-    Return instances in the place of found effect k, and by how much each fits worse, (D,).
+    Return instances in the place of found effect k, and how many squares each fits worse, (D,).
 
-    In whitened squares; None where the effect's kind has no need of a search.
-
-    k: which of the found effects, counted from 0.
+    None where the effect's kind has no need of a search.
     """
     effect = model.found[k]
     if not effect.fit.searched:
@@ -112,16 +106,12 @@ class _Looker:
     """What every look at a joint shares: the residual, and what must be fitted along."""
 
     maker: Maker
-    target: Array
-    """The residual of the model, zero where nothing is looked at, shape (rows,)."""
-    columns: Array
-    """Of frames and effects in the model, zero there, too, shape (P, rows)."""
-    seen: Array
-    """One where it is looked, else zero, shape (rows,)."""
+    target: Array  # the residual of the model, zero where nothing is looked at, shape (rows,)
+    columns: Array  # of frames and effects in the model, zero there, too, shape (P, rows)
+    seen: Array  # one where it is looked, else zero, shape (rows,)
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
-        """Take the residual and its columns at a model."""
         target = problem.whitened(problem.residuals(model), scale)
         maker = Maker(problem, problem.features(model), scale)
         return cls(maker, target, design(problem, model, scale), np.ones(target.size))
@@ -134,7 +124,6 @@ class _Looker:
 
     @cached_property
     def span(self) -> Array:
-        """Return orthonormal rows that span the columns, shape (P, rows)."""
         return span_of(self.columns)
 
     @cached_property
@@ -155,7 +144,6 @@ class _Looker:
         return features[at].seeds(type(effect), joint, np.split(pull, ends)[at])
 
     def best(self, effect: Effect) -> Effect:
-        """Return the best instance about one, zoom by zoom."""
         zoom = 0
         while (tried := self.tried(effect, zoom)) is not None:
             effects, gains = tried
@@ -198,7 +186,6 @@ class _Looker:
 
 
 def _view(maker: Features, effect: Effect) -> View:
-    """Return what an effect sees of a recording."""
     return maker.joint_view if effect.stage in MEMORY else maker.view
 
 

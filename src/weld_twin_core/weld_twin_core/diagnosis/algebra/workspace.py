@@ -48,8 +48,7 @@ class Part(NamedTuple):
     """What a set has or lacks: an effect, or one wave of an effect that has several."""
 
     site: Site
-    order: float | None = None
-    """Of the wave, in cycles per turn; None of the whole effect."""
+    order: float | None = None  # of the wave, in cycles per turn; None of the whole effect
 
 
 def parts(effect: Effect) -> list[Part]:
@@ -65,45 +64,31 @@ class Unit:
     site: Site
     seeds: tuple[Effect, ...]
     """Instances that span it; more than one where a parameter bends the response."""
-    columns: tuple[Index, ...]
-    """Column numbers of every seed."""
-    trials: float
-    """Among how many instances the seeds were chosen."""
+    columns: tuple[Index, ...]  # column numbers of every seed
+    trials: float  # among how many instances the seeds were chosen
     role: Role = Role.FOUND
 
 
 class Alike(NamedTuple):
     """Systems of seeds with the same number of columns."""
 
-    seeds: Index
-    """Which, counted over the units in order, shape (S,)."""
-    columns: Index
-    """Shape (S, K)."""
-    normal: Array
-    """Shape (S, K, K)."""
-    right: Array
-    """Shape (S, K)."""
-    size: Array
-    """Squared norm of every column before anything was projected out, shape (S, K)."""
+    seeds: Index  # which, counted over the units in order, shape (S,)
+    columns: Index  # shape (S, K)
+    normal: Array  # shape (S, K, K)
+    right: Array  # shape (S, K)
+    size: Array  # squared norm of every column before anything was projected out, shape (S, K)
 
 
 @dataclass(frozen=True, eq=False)
 class SeedSystems:
     """Normal equations of all seeds."""
 
-    alike: tuple[Alike, ...]
-    """One entry for every number of columns."""
-    rss: float = 0.0
-    """Sum of squares of the residual."""
+    alike: tuple[Alike, ...]  # one entry for every number of columns
+    rss: float = 0.0  # sum of squares of the residual
 
     @classmethod
     def of(cls, columns: Sequence[Index], normals: Sequence[Array]) -> SeedSystems:
-        """
-        Sort seeds by their number of columns.
-
-        columns: column numbers of every seed, shape (K,).
-        normals: products of its columns with each other, shape (K, K).
-        """
+        """Sort seeds by number of columns: their column numbers (K,) and products (K, K)."""
         out = []
         for size in sorted({index.size for index in columns}):
             seeds = np.array([k for k, index in enumerate(columns) if index.size == size])
@@ -140,14 +125,13 @@ def grown(
     alike: Alike, rss: float, effective: float, least: float = -np.inf
 ) -> tuple[NDArray[np.bool_], Array]:
     """
-    Return which columns of every seed are worth it, bool (S, K), and their log Bayes factor, (S,).
+    Return which columns of every seed are worth it, (S, K), and their log Bayes factor, (S,).
 
     Columns enter one at a time, the one that explains most first, as long as the evidence
-    grows; all together where that is worth more.
+    grows; all together where that is worth more. Up to ``least`` it does not matter which.
 
     rss: sum of squares of the residual.
     effective: number of independent rows.
-    least: log Bayes factor up to which it does not matter which columns are worth it.
     """
     diagonal, eye = np.einsum('sii->si', alike.normal), np.eye(alike.right.shape[1])
     live = diagonal > FLAT * alike.size
@@ -201,7 +185,6 @@ def evidence(rss: float, gain: float, freedom: float, effective: float) -> float
 
     .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
 
-    rss, gain: sum of squares before, and by how much it falls.
     freedom: coordinates that the fall took.
     effective: number of independent rows [1]_: autocorrelated residuals carry less than their count.
 
@@ -229,16 +212,12 @@ class Choice:
     seed: int
     log_bayes: float
     """Log of the evidence ratio against leaving the unit out (Schwarz's approximation)."""
-    alike: Alike
-    """The systems that the seed's is among."""
-    row: int
-    """Which of them."""
-    chosen: Index
-    """Of the seed's columns, those that earn their place."""
+    alike: Alike  # the systems that the seed's is among
+    row: int  # which of them
+    chosen: Index  # of the seed's columns, those that earn their place
 
     @cached_property
     def part(self) -> Part:
-        """Return what it puts into a set."""
         return parts(self.unit.seeds[self.seed])[0]
 
     @cached_property
@@ -247,7 +226,6 @@ class Choice:
         return np.asarray(self.alike.columns[self.row][self.chosen])
 
     def effect(self) -> Effect:
-        """Return the effect that the least-squares coefficients stand for."""
         normal = self.alike.normal[self.row][np.ix_(self.chosen, self.chosen)]
         scaled, size = unit_diagonal(normal, REPEATED)
         right = self.alike.right[self.row][self.chosen]
@@ -265,12 +243,10 @@ def ranking(
     open_to: NDArray[np.bool_] | None = None,
 ) -> list[Choice]:
     """
-    Return every unit's best choice, most evidence first.
+    Return every unit's best choice worth more than ``least``, most evidence first.
 
     systems: normal equations of all seeds, with the model projected out.
-    units: what may enter, each as a whole.
     effective: number of independent rows.
-    least: log Bayes factor that a choice must exceed.
     roles: which units are asked.
     open_to: which seeds may be chosen, counted over the units in order, shape (S,); all by default.
     """
@@ -299,17 +275,14 @@ def ranking(
 class Library:
     """Columns of every unit."""
 
-    columns: Columns
-    """All of them, in the order of their numbers."""
-    systems: SeedSystems
-    """The normal matrix of every seed."""
+    columns: Columns  # all of them, in the order of their numbers
+    systems: SeedSystems  # the normal matrix of every seed
     units: tuple[Unit, ...]
-    absent: dict[str, str]
-    """Why a family is not considered, by name."""
+    absent: dict[str, str]  # why a family is not considered, by name
 
     @cached_property
     def seeds_of(self) -> dict[Part, list[int]]:
-        """Return the seeds of every part, and of every effect as a whole, counted over the units."""
+        """Return the seeds, counted over the units, of every part and of every effect as a whole."""
         out: dict[Part, list[int]] = {}
         for k, seed in enumerate(seed for unit in self.units for seed in unit.seeds):
             for part in {*parts(seed), Part(Site.of(seed))}:
@@ -329,8 +302,7 @@ class Workspace:
     scale: Scale
     library: Library
     beliefs: Beliefs
-    bare_rss: float
-    """Whitened sum of squares before any effect was found."""
+    bare_rss: float  # whitened sum of squares before any effect was found
     _without: WeakKeyDictionary[Fit, dict[int, Fit]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -344,8 +316,7 @@ class Workspace:
         leaves about ``beliefs.misfit``^2 E of misfit in some ``beliefs.misfit_directions`` directions,
         and any further column may pick that up by chance.
 
-        trust: exponent between 0 and 1 by which autocorrelation is believed: while causes are
-        still missing from the model, it is theirs.
+        trust: exponent by which autocorrelation is believed: causes still missing make it theirs.
         """
         problem, beliefs, found = self.problem, self.beliefs, result.model.found
         share = effective_share(result.residual, problem.rows, problem.samples) ** trust
@@ -356,12 +327,7 @@ class Workspace:
         return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
     def independent(self, fits: Sequence[Fit]) -> float:
-        """
-        Return the number of independent rows by which fits are weighed against each other.
-
-        One count for all, that of the one which leaves least: a worse model explains less and would
-        otherwise be allowed more rows.
-        """
+        """Return the rows by which fits are weighed: as many as the one counts that leaves least."""
         return self.effective(min(fits, key=lambda f: f.rss))
 
     def without(self, now: Fit, k: int) -> Fit:
@@ -375,8 +341,7 @@ class Workspace:
         """
         Return of every found effect what a fit without it will leave, and how much it changes.
 
-        About the whitened sum of squares; and the RMS change of the residual [noise] as the effect
-        goes, before anything is fitted anew.
+        About the whitened squares; and the RMS change of the residual [noise] before any fit anew.
         """
         own, out = designed(self.problem, now.model, self.scale), []
         place = own.count - now.coordinates.size
@@ -402,10 +367,8 @@ class Workspace:
         """
         Return by how much log Bayes factor one set is ahead of another.
 
-        An effect or a wave more costs what it costs to enter: that two errors happen to be one
-        is seldom.
-
-        own, now: the one and the other.
+        An effect or wave more costs what it costs to enter: that two errors happen to be one is
+        seldom.
         """
         trials = {unit.site: float(np.log(unit.trials)) for unit in self.library.units}
 
@@ -433,7 +396,6 @@ class Workspace:
     def ranked(
         self, now: Fit, count: float, least: float = -np.inf, roles: Iterable[Role] = (Role.FOUND,)
     ) -> list[Choice]:
-        """Return what units are worth beside a fit, as `ranking` does."""
         return ranking(self.beside(now), self.library.units, count, least, tuple(roles))
 
 

@@ -66,7 +66,6 @@ def answer(
     Return the diagnosis of what was found in data that were examined.
 
     before: the table of answers, and what is said of the names.
-    alternative: what explains the gap without a formula.
     placing: what tells place and dependence of an unknown gap.
     limits: what the next experiment may cost, and where it has to stay; None plans none.
     """

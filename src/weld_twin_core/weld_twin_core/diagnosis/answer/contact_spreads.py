@@ -22,11 +22,7 @@ back on its feet is off by that much."""
 
 
 def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
-    """
-    Return how far tool points are from their contacts, None where an instrument measured.
-
-    Each place is left out in turn where there are enough.
-    """
+    """Return how far tool points are from contacts, also from places left out; else None."""
     problem = result.problem
     if not problem.touched:
         return None

@@ -98,8 +98,7 @@ def standard_errors(
     precision: of the prior of all fit coordinates, about zero, shape (K,).
     share: of the rows that count as independent.
     posterior: the models that the recordings allow; without, the one that was fitted alone counts.
-    sets: effects of which one is at work or another: an error holds for the case that it is this
-    one.
+    sets: effects of which one is at work or another: an error holds if it is this one.
     """
     if not model.found:
         return []
@@ -195,8 +194,7 @@ def with_intervals(
     """
     Return causes with the 90 % intervals of their shares, above a noise of RMS ``floor`` [m].
 
-    Where the status is unknown, or curves or many small errors stand for the causes, intervals are
-    those that folds show.
+    Of an unknown status, of curves and of many small errors, intervals are those that folds show.
     """
     curved = len(result.candidate_sets) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.candidate_sets) or not unseen.parts:

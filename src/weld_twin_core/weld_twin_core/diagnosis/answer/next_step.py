@@ -60,8 +60,7 @@ def next_step(
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
 
-    The verdict has the confidence that it has earned; ``alternative`` explains the gap without a
-    formula.
+    The verdict has the confidence it has earned; ``alternative`` explains the gap without a formula.
     """
     if result.problem.untracked:
         return _touches(result, verdict)

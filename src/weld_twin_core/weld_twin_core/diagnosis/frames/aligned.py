@@ -46,11 +46,10 @@ def aligned(
     """
     Return the recordings as a problem, and the model that a search starts from.
 
-    recordings: with measurements or contacts; what an instrument measured comes first in the problem.
-    robot: the nominal model.
-    align: frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'. Of contacts
-    'tool' where the tool point is not known; 'base' where it is not known where the base stands,
-    which says nothing where all places are unknown too.
+    recordings: what an instrument measured comes first in the problem, contacts after it.
+    align: frames fitted as nuisance in every hypothesis. Of contacts 'tool' where the tool point is
+    not known; 'base' where it is not known where the base stands, which says nothing where all
+    places are unknown too.
     known: put into the twin first.
     given: of which of the recordings given each is a part; each by itself when left out.
 
@@ -72,10 +71,7 @@ def aligned(
 
 def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Model:
     """
-    Return the robot with the frames that best agree with a recording.
-
-    recording: with measurements.
-    align: which frames are fitted: 'base', 'tool' or both.
+    Return the robot with the frames in ``align`` that best agree with a recording.
 
     Raises DataError: nothing was measured, or the clocks of joints and measurements do not meet.
     """
@@ -103,7 +99,6 @@ def _started(
 
 
 def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
-    """Return what an instrument measured, without the contacts beside it."""
     kept = [k for k in range(len(problem.recordings)) if problem.contact(k) is None]
     given = tuple(problem.given[k] for k in kept)
     anchor = problem.anchor

@@ -82,8 +82,7 @@ def rough_frames(
     """
     Return models with base and tool frames in closed form, both free, of several trials at once.
 
-    A trial has one track for every recording; all have as many samples, all are turned or none.
-    Where ``thorough``, more tools are started from.
+    A trial has one track for every recording, all of one kind; ``thorough`` starts from more tools.
     """
     reaches = REACHES if thorough else ()
     out: list[Model] = []
@@ -95,7 +94,6 @@ def rough_frames(
 
 
 def refined(problem: Problem, model: Model) -> Model:
-    """Return the frames after a robust least-squares fit of the frames in ``problem.align``."""
     result, model = model.found, model.with_found(())
     for _ in range(3):
         scale = robust_scale(problem, problem.residuals(model))
@@ -130,7 +128,6 @@ def _base_only(tracks: list[Track], model: Model) -> Model:
 
 
 def _tool_only(tracks: list[Track], model: Model) -> Model:
-    """Return the model with the tool frame that fits the given bases."""
     start = model.robot.T_flange_tool
     tool, weights = start, [np.ones(len(track.position)) for track in tracks]
     for _ in range(ROUNDS):
@@ -160,7 +157,6 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
 def _bases_and_tools(
     tracks: list[Track], models: Sequence[Model], reaches: tuple[float, ...]
 ) -> list[Model]:
-    """Return every trial's model; the tracks have the axis of trials in front."""
     tools = np.stack([model.robot.T_flange_tool for model in models])
     turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
     if all(track.rotation is not None for track in tracks):
@@ -228,8 +224,6 @@ def _turn_weight(track: Track, tool: Array) -> Array:
 
 
 class Bases(NamedTuple):
-    """The base frame of one recording for every start: rotations (T, S, 3, 3), origins (T, S, 3)."""
-
     rotation: Array
     origin: Array
 
@@ -285,7 +279,6 @@ def _reached(track: Track, vectors: Array) -> Array:
 
 
 def _turned(track: Track, turn: Array) -> Array:
-    """Return how the tool is turned in the base, shape (T, M, 3, 3)."""
     return np.asarray(track.turn @ turn[:, None])
 
 

@@ -54,10 +54,7 @@ UNTOLD = 0.9
 
 def families_named(given: str | Iterable[str], what: str = 'may_change') -> tuple[str, ...]:
     """
-    Return the families that may differ between recordings.
-
-    given: names with commas between, or several names; nothing for none.
-    what: how the message names the argument.
+    Return the families that may differ between recordings; ``what`` names them in a message.
 
     Raises ModelError: a name is no effect, or one that is not constant.
     """
@@ -87,11 +84,9 @@ def with_changes(
     """
     Return problem and model with what differs between the recordings, fitted.
 
-    problem: several recordings; with fewer nothing changes.
-    model: what is believed so far; its effects are fitted along.
+    model: its effects are fitted along.
     families: what may differ; see `families_named`.
-    precision: prior precision of the effects of ``model``, shape (K,); that of machines at large
-    when left out.
+    precision: prior precision of the effects, shape (K,); that of machines at large when left out.
     """
     candidates = _candidates(problem, model.robot, families)
     if not candidates:
@@ -187,7 +182,6 @@ def _chosen(
 
 
 def _places(problem: Problem, model: Model) -> list[Array]:
-    """Return the columns of every change."""
     sizes = [change.effect.fit.coordinates().size for change in model.changes]
     first = problem.frame_count + problem.shared_count
     ends = first + np.cumsum(np.array([0, *sizes], dtype=int))
@@ -241,10 +235,8 @@ def list_changes(
     problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
 ) -> tuple[Changed, ...]:
     """
-    Return what differs between the recordings beyond noise, by recording.
+    Return what differs between recordings beyond noise by a fitted model, by recording.
 
-    problem, model, scale: a model fitted to all measurements.
-    precision: prior precision of the coordinates of the found effects, shape (K,).
     families: what may differ. Frames that were fitted for each recording are compared here.
     """
     columns, ridge = _columns(problem, model, scale, precision)
@@ -291,7 +283,6 @@ def _bases(
 def _columns(
     problem: Problem, model: Model, scale: Scale, precision: Array
 ) -> tuple[Columns, Array]:
-    """Return all columns and their prior precision."""
     columns = designed(problem, model, scale)
     prior = precision if precision.size else np.zeros(coordinates(model).size)
     return columns, np.concatenate([frame_prior(problem, model)[0], prior])

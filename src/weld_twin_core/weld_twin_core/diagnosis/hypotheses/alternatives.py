@@ -37,9 +37,8 @@ def fit_alternatives(
     work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()
 ) -> CandidateSet:
     """
-    Return found effect k and those that could take its place, most probable first.
+    Return found effect k of a final fit and those that could take its place, most probable first.
 
-    now: the final fit, on the workspace's problem and scale.
     others: sets that do without something found: what takes its place may need company.
     """
     place = Site.of(now.model.found[k])

@@ -119,7 +119,6 @@ class _Shelf:
     def place(
         self, site: Site, seeds: Sequence[Effect], trials: float, role: Role = Role.FOUND
     ) -> None:
-        """Add the unit of those seeds that the data show."""
         every = ((seed, self._maker.piece(seed)) for seed in seeds)
         shown = [(seed, piece) for seed, piece in every if _shown(seed, piece)]
         if not shown:

@@ -52,8 +52,7 @@ ROUNDS = 4
 class Other(NamedTuple):
     """A set of effects that does without one that was found."""
 
-    instead_of: Part | None
-    """What it does without; None where waves were only chosen anew."""
+    instead_of: Part | None  # what it does without; None where waves were only chosen anew
     fit: Fit
     ahead: float
     """By how large a log Bayes factor it is ahead of what was found; less than nothing where
@@ -65,16 +64,11 @@ class Sets:
     """Sets of a library's units, to first order, with the frames taken out of all that is compared."""
 
     library: Library
-    systems: SeedSystems
-    """The normal equations of all seeds."""
-    frames: Array
-    """Products of the library's columns with what spans the frames, shape (K, P)."""
-    right: Array
-    """Products of its columns with the residual, shape (K,)."""
-    enter_log_bayes: float
-    """Log Bayes factor that a unit must be worth."""
-    count: float = 1.0
-    """Number of independent rows."""
+    systems: SeedSystems  # the normal equations of all seeds
+    frames: Array  # products of the library's columns with what spans the frames, shape (K, P)
+    right: Array  # products of its columns with the residual, shape (K,)
+    enter_log_bayes: float  # log Bayes factor that a unit must be worth
+    count: float = 1.0  # number of independent rows
     _cross: dict[int, Array] = field(default_factory=dict, repr=False)
     _worth: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
 
@@ -106,11 +100,7 @@ class Sets:
     def beside(
         self, chosen: Sequence[Choice], open_to: NDArray[np.bool_], least: float = -np.inf
     ) -> list[Choice]:
-        """
-        Return what units are worth beside a set, more than the least, most evidence first.
-
-        open_to: which of the library's seeds may be chosen, shape (S,).
-        """
+        """Return what units with seeds open, (S,), are worth beside a set, most evidence first."""
         columns = _columns(chosen)
         systems = self.systems
         if columns:
@@ -127,7 +117,6 @@ class Sets:
         return out
 
     def _equations(self, columns: list[int]) -> tuple[Array, Array]:
-        """Return the normal equations of some columns."""
         self._know(columns)
         normal = np.array([self._cross[c][columns] for c in columns])
         return normal.reshape(2 * (len(columns),)), self.right[columns]
@@ -188,12 +177,7 @@ class Sets:
 
 
 def reconsidered(work: Workspace, now: Fit, sets: Sets) -> tuple[Fit, list[Other]]:
-    """
-    Return the best set that doing without one effect at a time leads to, and others near it.
-
-    now: what the search found.
-    sets: of the workspace's library.
-    """
+    """Return the best set that doing without one effect at a time leads to, and others near it."""
     for _ in range(ROUNDS):
         others = _others(work, now, replace(sets, count=work.effective(now)))
         best = max(others, key=lambda other: other.ahead, default=None)

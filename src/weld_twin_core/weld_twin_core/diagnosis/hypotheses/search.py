@@ -41,11 +41,7 @@ LeftOn = Callable[[Search], float]
 def search(
     problem: Problem, start: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
 ) -> Search:
-    """
-    Return the effects that earn their place, fitted on all measurements.
-
-    start: the nominal robot with frames to start from, and the effects known.
-    """
+    """Return the effects that earn their place, fitted on all measurements, frames as started."""
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
     baseline, scale = robust_fit(full, start)
@@ -79,11 +75,7 @@ def search(
 
 
 def refitted(result: Search, small: Fit) -> Search:
-    """
-    Return what was found with another choice of effects, fitted on all measurements.
-
-    small: the choice, fitted on the workspace's measurements.
-    """
+    """Return a search with another choice, fitted on few measurements, fitted on all of them."""
     final, scale = robust_fit(result.problem, small.model, rounds=1)
     precision = effect_precision(final.model)
     return replace(result, small=small, final=final, scale=scale, precision=precision)
@@ -145,7 +137,6 @@ def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[C
 
 
 def names(model: Model) -> list[tuple[str, str | None, int]]:
-    """Return the key of a set of found effects."""
     return sorted(
         ((*Site.of(e), e.fit.coordinates().size) for e in model.found),
         key=lambda item: (item[0], item[1] or '', item[2]),
@@ -169,8 +160,6 @@ def borne_out(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
 
     An effect gives its place to its like where that alone carries over. Then those that leave more
     than the effect in the model are no alternatives.
-
-    left_on: what held-out recordings say of a model.
     """
     # What no machine has is left out of the model and its candidate sets, not of their fits.
     if len(result.candidate_sets) == len(result.small.model.found):
@@ -217,7 +206,6 @@ def _exchanged(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
 
 
 def _left(result: Search, some: Sequence[Alternative], left_on: LeftOn) -> list[float]:
-    """Return what each alternative leaves on held-out recordings, RMS [m]."""
     return [left_on(replace(result, final=one.fit)) for one in some]
 
 

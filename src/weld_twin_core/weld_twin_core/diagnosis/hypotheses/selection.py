@@ -24,12 +24,9 @@ SHORTLIST = 4
 class _Step(NamedTuple):
     """What a step of a selection comes to."""
 
-    fit: Fit
-    """With the best choice that a machine can have; as it was where there is none."""
-    entered: str | None
-    """What entered, in words."""
-    impossible: list[Effect]
-    """Better ones that no machine has."""
+    fit: Fit  # with the best choice that a machine can have; as it was where there is none
+    entered: str | None  # what entered, in words
+    impossible: list[Effect]  # better ones that no machine has
     passed: bool
     """Whether one of these was passed over that is of no machine's size: what only has no such shape
     is another family's, or that of several causes together."""
@@ -46,13 +43,12 @@ def forward(
 
     Several causes together may look like one that no machine has, and so may one that the library
     lacks. So the search passes it over; where it, or another such, would still explain what is left in
-    the end, all that entered after it stood in for a part of that, and goes. What looks like a machine's
+    the end, all that entered after it stood in for a part of that, and goes. What looks like a
+    machine's
     may stand in for several, too, until what enters next drives it beyond that: then it makes
     room, if the set that this leads to is worth more.
 
-    now: with what the model has already.
     most: stop after this many units.
-    tick: called with what was found, for progress.
     """
     gone = set[Site]()
     made_room = _selected(work, now, most, tick, gone)
@@ -65,11 +61,7 @@ def forward(
 def _selected(
     work: Workspace, now: Fit, most: int, tick: Callable[[str], None], gone: set[Site] | None
 ) -> tuple[Fit, list[Effect]]:
-    """
-    Return what `forward` does.
-
-    gone: what made room is added, and does not come back; None where nothing makes room.
-    """
+    """Return what `forward` does; what made room is added to ``gone`` for good, None: nothing does."""
     doubted: tuple[Fit, list[Effect]] | None = None
     for _ in range(most):
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
@@ -95,11 +87,7 @@ def _selected(
 
 
 def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool) -> _Step:
-    """
-    Return the step that the best choice is.
-
-    makes_room: whether what was found before goes where a choice drives it beyond its limits.
-    """
+    """Return the step that the best choice is; what it drives too far goes if it ``makes_room``."""
     beliefs, impossible, passed = work.beliefs, list[Effect](), False
     while ranked:
         slack = max(beliefs.close_log_bayes, beliefs.close_share * ranked[0].log_bayes)
@@ -136,26 +124,19 @@ def _misshapen(robot: Robot, effect: Effect) -> bool:
 
 
 def sites(result: Fit) -> list[Site]:
-    """Return what is in the model of a fit."""
     return [Site.of(effect) for effect in result.model.found]
 
 
 def implausible(model: Model) -> list[Effect]:
-    """Return the effects of a model that are beyond what a machine can have."""
     return [effect for effect in model.found if beyond(model.robot, effect)]
 
 
 def possible_part(model: Model) -> Model:
-    """Return the model without the effects that are beyond what a machine can have."""
     return model.with_found(tuple(e for e in model.found if not beyond(model.robot, e)))
 
 
 def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
-    """
-    Return the fit without what no machine has; that is added to those refused.
-
-    refused: those refused so far; more are added to it.
-    """
+    """Return the fit without what no machine has; that is added to those refused."""
     while absurd := implausible(now.model):
         refused += absurd
         now = work.fitted(possible_part(now.model))

@@ -32,20 +32,16 @@ class Curved:
     form: FreeForm
     kept: tuple[Effect, ...]
     """Effects that stayed beside it: those named beyond doubt, and the set-up's own motion."""
-    found: Search
-    """With the curves in its final fit."""
-    unseen: Unseen
-    """Of that fit."""
+    found: Search  # with the curves in its final fit
+    unseen: Unseen  # of that fit
 
 
 def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     """
     Return curves for what a verdict leaves beside its names; None where there are none.
 
-    What holds in no other posture may still be predicted from neighbours in time.
-
-    result: the set-up's own motion that it holds stays beside the curves.
-    verdict: of one that names something nothing is left.
+    What holds in no other posture may still be predicted from neighbours in time. The set-up's own
+    motion stays beside the curves; beside a verdict that names something nothing is left.
     """
     if verdict.status in NAMING or (result.dense and verdict.sets):
         return None
@@ -99,7 +95,6 @@ def choose_model(
     """
     Return the model to go on with, its predictions in unseen folds, its shrink, the verdict.
 
-    result, unseen, shrink: of the effects found.
     alternative: the free-form explanation; carried where the verdict is 'unknown' and it predicts
     as well. What makes unseen data worse than the nominal robot does is not carried at all, nor
     told; nor is what has no name and makes them hardly better, which would move points for nothing.
@@ -134,12 +129,7 @@ def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Belief
 
 
 def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> Verdict:
-    """
-    Return 'unknown' in the place of 'none' where free curves predict what looks like noise.
-
-    verdict: of any other status, nothing changes.
-    alternative: the free-form explanation, whether or not it holds on another motion.
-    """
+    """Return 'unknown' in the place of 'none' where free curves predict what looks like noise."""
     if verdict.status != 'none' or alternative is None:
         return verdict
     form = alternative.form
@@ -168,11 +158,9 @@ def locate_gap(
     """
     Return the groups that tell place and dependence of an unknown gap; of any other nothing.
 
-    They explain what is left beside everything that is reported.
-
-    result: the effects found, before curves take their place.
-    alternative: the free-form explanation beside what is reported. Where there is none, what was found
-    to be left beside the model is a place, and so are joints that noise comes from.
+    They explain what is left beside everything that is reported. Where there is no free-form
+    explanation, what was found to be left beside the model is a place, and so are joints that noise
+    comes from.
     """
     if verdict.status != 'unknown':
         return FreeForm(())

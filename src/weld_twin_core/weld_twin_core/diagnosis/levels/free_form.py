@@ -42,8 +42,7 @@ class Part:
     ridge: float
     alternatives: tuple[tuple[Group, float], ...]
     """Each group that could stand in its place and its weight, itself included."""
-    share: float = 0.0
-    """Of the squared error that is lost without it on unseen folds."""
+    share: float = 0.0  # of the squared error that is lost without it on unseen folds
 
     def weight_of(self, kind: str) -> dict[str, float]:
         """Return the weight of every place ('at') or dependence ('on'), largest first."""
@@ -63,12 +62,9 @@ class Part:
 class FreeForm:
     """The free-form explanation."""
 
-    parts: tuple[Part, ...]
-    """In the order in which they were found."""
-    gain: float = 0.0
-    """Share of the squared error that they take away on unseen folds, together."""
-    steady: float = 0.0
-    """The same in standard errors between folds."""
+    parts: tuple[Part, ...]  # in the order in which they were found
+    gain: float = 0.0  # share of the squared error that they take away on unseen folds, together
+    steady: float = 0.0  # the same in standard errors between folds
 
     @property
     def curves(self) -> tuple[Effect, ...]:
@@ -104,7 +100,6 @@ def free_form(
     """
     Return the few groups that explain what a fit leaves, each with its alternatives.
 
-    bare: frames and the effects that are named beyond doubt.
     wandering: look for what changes as the recording goes on, and ask no more of it than to
     predict short stretches from their neighbours.
     """
@@ -179,7 +174,6 @@ class Choosing:
 
     @cached_property
     def _alone(self) -> list[Array]:
-        """Return the products of every group's columns with each other."""
         return [group.columns @ group.columns.T for group in self.groups]
 
     def by_chance(self, members: Sequence[Member], gain: float, steady: float) -> bool:
@@ -235,16 +229,12 @@ def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Mem
 class Worth(NamedTuple):
     """What the groups chosen take off the squared error on unseen folds."""
 
-    shares: tuple[float, ...]
-    """Of each, what is lost without it; together they make up ``gain``."""
-    gain: float
-    """Share that all of them take away, by the way of dividing that shows least."""
-    steady: float
-    """That fall in its standard errors between folds."""
+    shares: tuple[float, ...]  # of each, what is lost without it; together they make up ``gain``
+    gain: float  # share that all of them take away, by the way of dividing that shows least
+    steady: float  # that fall in its standard errors between folds
 
 
 def worth(work: Choosing, members: list[Member]) -> Worth:
-    """Return what the groups chosen are worth on unseen folds."""
     none, now = work.errors([]), work.errors(members)
     gain = max(_worst_gain(none, now), 0.0)
     steady = min(steadiness(a, b) for a, b in zip(none, now, strict=True))
@@ -262,12 +252,9 @@ def alternative_weights(
     Return each group with its weight in the place of member k, the weights adding up to one.
 
     A group that leaves as much on unseen folds weighs as much; one that leaves r times the squared
-    error weighs r to the power of -rows / 4: the likelihood of so many independent rows, softened
+    error weighs r to the power of -rows
+    4: the likelihood of so many independent rows, softened
     by two because real physics is a little richer than any group.
-
-    work: groups and their folds.
-    members: the groups chosen.
-    k: which of them is compared with the others.
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))

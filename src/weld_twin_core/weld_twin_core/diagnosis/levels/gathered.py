@@ -34,15 +34,7 @@ def gathered(
     beliefs: Beliefs,
     with_strays: float,
 ) -> Evidence:
-    """
-    Return the evidence for a verdict.
-
-    result, unseen: the search, and unseen folds under its final model.
-    leftover: what generic columns still find beside it.
-    shrink: on held-out recordings or by cross-validation.
-    families: what each kind accounts for, where many small errors were fitted together.
-    with_strays: what is left on unseen data with the readings that are left out, RMS [m].
-    """
+    """Return the evidence for a verdict; with_strays: unseen RMS with readings that are left out [m]."""
     robot, parts = result.final.model.robot, unseen.targets[1:]
     total = parts.sum(axis=0)
     whole = max(float(total @ total), EMPTY)

@@ -101,14 +101,7 @@ def _ways(maker: Features) -> Array:
 
 
 def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
-    """
-    Return the variances' normal equations, (folds, K, K) and (folds, K), and sizes, (K + 1,).
-
-    Sizes are the sums of squares of each way and of the differences.
-
-    remaining: differences in units of noise, shape (M, c).
-    ways: shape (K, c, M).
-    """
+    """Return variances' equations (folds, K, K), (folds, K), and sizes of ways (K, c, M) and all."""
     cross = np.einsum('acm,bcm->abm', ways, ways, optimize=True) ** 2
     along = np.einsum('acm,mc->am', ways, remaining) ** 2
     ends = [part[0] for part in np.array_split(np.arange(len(remaining)), STRETCHES)]
@@ -131,7 +124,6 @@ def _shared_out(normal: Array, right: Array) -> Array:
 
 
 def _errors(normal: Array, right: Array) -> Array:
-    """Return the standard errors of the variances, by leaving out one fold at a time."""
     whole, pulls = normal.sum(axis=0), right.sum(axis=0)
     tries = np.array(
         [_shared_out(whole - a, pulls - b) for a, b in zip(normal, right, strict=True)]

@@ -78,11 +78,9 @@ def allowed(
     nameless: bool = False,
 ) -> Posterior:
     """
-    Return the models that the recordings allow.
+    Return the models that the recordings allow, about one fitted to all measurements.
 
-    problem, model, scale: a model fitted to all measurements.
-    precision: prior precision of the found effects' coordinates in that fit, shape (K,); may be
-    empty.
+    precision: prior of the found effects' coordinates in that fit, shape (K,); may be empty.
     floor: what the recordings themselves say of the instrument's noise.
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
@@ -123,8 +121,8 @@ def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
     """
     Return the shrink with what may be left of the gap where nothing was recorded.
 
-    Regions of one motion that foretell each other say little of others: beyond what they show the model
-    may be off by as much as the posterior has it there.
+    Regions of one motion that foretell each other say little of others: beyond what they show the
+    model may be off by as much as the posterior has it there.
     """
     if shrink.elsewhere_ci95 is None or shrink.rms_before_m == 0.0:
         return shrink
@@ -134,7 +132,6 @@ def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
 
 
 def _noisy(scale: Scale) -> Scale:
-    """Return a scale with some noise at least."""
     return replace(
         scale,
         position=max(scale.position, LEAST),
@@ -166,12 +163,9 @@ def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> P
 
 def corrected_sigma(posterior: Posterior, model: Model, q: Array) -> float:
     """
-    Return how far a robot may be off that is corrected by a model, at postures at rest [m].
+    Return how far a robot corrected by a model may be off at postures at rest, (M, n) [m].
 
-    What a diagnosis warns of and what `planned` promises. `usual_sigma` says which number.
-    Corrections are made with the effects in the middle of the allowed models.
-
-    q: shape (M, n).
+    What a diagnosis warns of and what `planned` promises; effects in the middle of those allowed.
     """
     effects, known = posterior.centred(model.found)
     twin = Twin(model.twin(0).robot, of_the_robot((*model.known, *effects)))
@@ -267,14 +261,7 @@ def _prior(what: Directions, model: Model) -> Prior:
 
 
 class Conditioning:
-    """
-    The coordinates given rows, all of them or all but some.
-
-    rows: what was measured, as linear equations.
-    prior: what is known of the coordinates before.
-    width: prior standard deviation of every coordinate, shape (P,).
-    noise: variance of a row.
-    """
+    """The coordinates given rows, all of them or all but some; width (P,) and variance of a row."""
 
     def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
         self._prior, self._width = prior, width
@@ -300,11 +287,7 @@ class Conditioning:
         return root_of(with_prior(system)), right
 
     def given(self, but: Products | None = None) -> tuple[Array, Array]:
-        """
-        Return mean, shape (P,), and covariance, shape (P, P), of the coordinates.
-
-        but: rows left out.
-        """
+        """Return mean, (P,), and covariance, (P, P), of the coordinates by all rows but some."""
         width = self._width
         root, right = self._equations(but)
         inverse = inverse_of(root)
@@ -324,8 +307,7 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     Return the directions of aligned frames in which an error does not show, in words.
 
     A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
-    along z by which no measured pose changes. Places that are touched and not known say nothing of where
-    the arm stands.
+    along z by which no measured pose changes. Places touched and not known tell nothing of the base.
     """
     unseen = problem.untracked and not problem.placed
     result = open_directions(problem, model)

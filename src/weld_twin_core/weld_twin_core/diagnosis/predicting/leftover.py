@@ -75,29 +75,18 @@ Given = Callable[[Products], tuple[Array, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """
-    Every sample as the other regions of posture foretell it.
+    """Every sample as other regions of posture foretell it: shifts [m], turns [rad], zero without."""
 
-    Shifts [m] first, then turns [rad]. Rows that a sample does not have are zero.
-    """
-
-    error: Array
-    """What was measured less what was predicted, shape (N, 6)."""
+    error: Array  # what was measured less what was predicted, shape (N, 6)
     ways: Array
     """In which what was predicted may be off, each of one standard deviation, shape (R, N, 6);
     (R, N, 3) of points."""
-    levers: Array
-    """d pose / d joint, shape (n, N, 6)."""
-    shaken: Array
-    """How hard joints were accelerated just before, shape (N, n) [rad/s^2 or m/s^2]."""
-    seen: NDArray[np.bool_]
-    """Rows that a sample has, shape (N, 6)."""
-    region: NDArray[np.int_]
-    """Which region of posture it lies in, shape (N,)."""
-    good: NDArray[np.bool_]
-    """Samples that are no outliers, shape (N,)."""
-    at_rest: bool
-    """Whether all are stations."""
+    levers: Array  # d pose / d joint, shape (n, N, 6)
+    shaken: Array  # how hard joints were accelerated just before, shape (N, n) [rad/s^2 or m/s^2]
+    seen: NDArray[np.bool_]  # rows that a sample has, shape (N, 6)
+    region: NDArray[np.int_]  # which region of posture it lies in, shape (N,)
+    good: NDArray[np.bool_]  # samples that are no outliers, shape (N,)
+    at_rest: bool  # whether all are stations
     left: Array
     """What is left of a sample, shape (N, 6). Of stations, which many coordinates follow closely, it is
     the error. Of a motion it is what the middle of the models leaves that all regions allow."""
@@ -118,9 +107,8 @@ class Predicted:
         """
         Return what a model foretells of samples that it was not fitted to.
 
-        unseen: of the fitted model, with regions of posture left out in turn.
+        unseen: with regions of posture left out in turn.
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
-        shaken: as the field.
         parts: the columns' products in every region.
         whole: mean and covariance of the coordinates given all rows.
         """
@@ -218,7 +206,6 @@ def leftover(
     """
     Return the standard deviations of what is left over.
 
-    predicted: of the samples of the problem.
     turning: joints that turn, shape (n,); what slides has no gear.
     noise: of a measured coordinate [m], given with the data or seen in them.
     rough: share of the arm's small errors that are of a usual size.
@@ -332,10 +319,8 @@ def _of_the_arm(
     """
     Return the part of what is left over that is the arm's, as a factor of its size.
 
-    remaining: variance of what is left [m^2].
-    common: the share of it that neighbours have in common.
+    remaining, common: variance [m^2], and the share of it that neighbours have in common.
     noise: standard deviation of the instrument [m]; None where nothing tells it.
-    at_rest: whether stations were measured, which lie apart.
     """
     alone = 1.0 - common
     if noise is None:
@@ -346,11 +331,7 @@ def _of_the_arm(
 
 
 class Spread(NamedTuple):
-    """
-    What is left over per axis [m] and in every joint [rad], shape (n,).
-
-    ``surely`` tells that no instrument leaves it: it goes by the levers of joints.
-    """
+    """What is left over per axis [m] and in every gear, (n,) [rad]; ``surely`` of no instrument."""
 
     position: float
     gears: Array
@@ -363,8 +344,6 @@ def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bo
 
     Of all gears alike, or of one alone. An instrument is less sure along some directions than along
     others, and these stay where they are; levers turn with the arm.
-
-    turning: shape (n,).
     """
     few = np.unique(np.linspace(0, len(errors) - 1, min(len(errors), MOST)).round().astype(int))
     errors, moments, levers = errors[few], moments[few], levers[few]
@@ -447,11 +426,7 @@ def _believed(chance: float, common: float) -> float:
 def _neighbours(
     problem: Problem, here: NDArray[np.int_]
 ) -> Iterator[tuple[int, NDArray[np.int_], NDArray[np.int_]]]:
-    """
-    Yield groups of neighbours in time; of stations, in posture.
-
-    How many there are at most, samples in their order, and where each group begins among them.
-    """
+    """Yield groups of neighbours in time or posture: most in one, samples in order, first of each."""
     if here.size < 2:
         return
     if not problem.at_rest:

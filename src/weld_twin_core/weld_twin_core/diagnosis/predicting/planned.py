@@ -71,8 +71,7 @@ class Wanted(NamedTuple):
 class MeasurementPlan:
     """Stations to measure, and how sure the model will be after each."""
 
-    q: Array
-    """In the order in which they say most, shape (N, n) [rad, m]."""
+    q: Array  # in the order in which they say most, shape (N, n) [rad, m]
     sigma: Array
     """Standard deviation of the tool in its worst direction, in the middle of the region's
     postures, after that many stations, shape (N + 1,) [m]."""
@@ -114,8 +113,8 @@ def _before_any(robot: Robot, q: Array, own: float) -> Posterior:
     """
     Return how sure an arm is before anything is measured of it, its frames not known.
 
-    own: what the arm itself scatters [m]. Of an arm that has all small errors a diagnosis counts as its
-    own what nothing tells from it (`leftover.ROUGH`), and so does the plan of one.
+    Of the arm's own scatter [m] a diagnosis counts as its own what nothing tells from it
+    (`leftover.ROUGH`), and so does the plan of one.
     """
     effects = plausible_arm.directions(robot, ())
     what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([q]))
@@ -135,11 +134,9 @@ def plan_more(
     Before the first of them it is as sure there as `twin.posterior.usual_sigma` says: the promise
     of a plan is the warning of the diagnosis. New stations count in the set-up that was recorded.
 
-    twin: the fitted model.
     region: postures at which it is judged how sure the model is, and those that may be measured.
-    count: stations; at most as many as may be measured.
 
-    Raises DataError: a number means nothing.
+    Raises DataError: a number means nothing, or there are fewer stations than counted.
     """
     offered = len(region[1])
     if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= offered):
@@ -157,7 +154,6 @@ def _planned(
     count: int,
     given: Wanted,
 ) -> MeasurementPlan:
-    """Return the plan after a posterior."""
     anywhere = postures_within_limits(twin.robot, JUDGED)
     still = posterior.at_rest(twin, np.concatenate([*region, anywhere]))
     ways, rest = posterior.position_ways(Features(twin, still, still.joints.t))
@@ -202,11 +198,7 @@ def _gains(seen: Array, offered: Array, noise: Array) -> Array:
 
 
 def clear_postures(robot: Robot, spread: float) -> Array:
-    """
-    Return postures about that of a usual seam, clear of floor and column, shape (K, n).
-
-    spread: half the range of every joint [rad].
-    """
+    """Return postures about that of a usual seam, clear of floor and column, (K, n)."""
     middle = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=10.0).motion.q
     centre = middle[len(middle) // 2]
     own = robot.branches[1] if robot.behind else robot

@@ -106,7 +106,7 @@ def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
 
 def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
     """
-    Return the family number of every coordinate, shape (K,), and which families are a gear's.
+    Return the family number of every coordinate, (K,), and which families are a gear's.
 
     A family is an effect on all joints; but every gear is as uneven as it was cut, and says
     nothing of the others.
@@ -158,7 +158,6 @@ def discrepancy(
     """
     Return what no parameter explains, with gears as uneven where they were not seen.
 
-    rest: what is left over where it was recorded.
     fine: height of every joint's fine curve, shape (n,).
     jumps: how many the recordings showed.
     result: a curve without a formula among them says nothing beyond its ends, so that the joint

@@ -61,16 +61,13 @@ SEED = 1
 class Prior:
     """Where coordinates lie before the data."""
 
-    middle: Array
-    width: Array
-    """Counted from the fit, shape (P,); standard deviation of a usual one."""
-    group: NDArray[np.int_]
-    """Family, -1 for frames, which are as wide as they are, shape (P,)."""
+    middle: Array  # counted from the fit, shape (P,)
+    width: Array  # standard deviation of a usual one, shape (P,)
+    group: NDArray[np.int_]  # family, -1 for frames, which are as wide as they are, shape (P,)
     gears: NDArray[np.bool_]
     """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
     geometry."""
-    tied: NDArray[np.bool_]
-    """Families whose coordinates all have one size, shape (G,)."""
+    tied: NDArray[np.bool_]  # families whose coordinates all have one size, shape (G,)
 
 
 class Products(NamedTuple):
@@ -98,15 +95,10 @@ class Rows:
 
     @cached_property
     def products(self) -> Products:
-        """Return the products of all rows."""
         return Products(self.columns @ self.columns.T, self.columns @ self.residual)
 
     def parts(self, labels: Array) -> list[Products]:
-        """
-        Return the products of the rows of every label, the least first.
-
-        labels: of every row, shape (rows,).
-        """
+        """Return the products of the rows of every label, (rows,), the least first."""
         out = []
         for label in np.unique(labels):
             columns = self.columns[:, labels == label]
@@ -117,31 +109,21 @@ class Rows:
 class Weighed(NamedTuple):
     """All models together."""
 
-    mean: Array
-    """Shape (P,)."""
-    covariance: Array
-    """Shape (P, P)."""
+    mean: Array  # shape (P,)
+    covariance: Array  # shape (P, P)
     shown: Array
     open: Array
     """Width of the one prior that stands for all sizes: by precision, as it counts where data show
     a coordinate, and by variance, as it counts where they do not, shape (P,)."""
-    noise: float
-    """Variance of a row."""
-    drawn: tuple[Array, ...]
-    """Widths of the priors of some models, each shape (P,)."""
+    noise: float  # variance of a row
+    drawn: tuple[Array, ...]  # widths of the priors of some models, each shape (P,)
     rough: float
     """Share of the small errors that are of a usual size, among those of the geometry or those of
     the gears, whichever are rougher."""
 
 
 def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
-    """
-    Return the coordinates given rows, over all models.
-
-    rows: what was measured, as linear equations.
-    prior: what is known of the coordinates before.
-    expected: variance of a row before anything is known.
-    """
+    """Return the coordinates over all models; a row varies as expected before anything is known."""
     chain, drawn = _Chain(rows, prior, expected), []
     for sweep in range(SWEEPS):
         chain.step(look=sweep >= LEARNING)
@@ -172,11 +154,7 @@ def with_prior(information: Array) -> Array:
 
 
 def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """
-    Return which coordinates no data like these could show, shape (P,).
-
-    frames: coordinates of fitted frames, shape (P,).
-    """
+    """Return which coordinates, but those of frames, no data like these could show, shape (P,)."""
     columns = rows.columns
     basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
     square = np.einsum('ij,ij->i', columns, columns)
@@ -317,11 +295,7 @@ class _Chain:
                 dger(-factor, column, column, a=covariance, overwrite_a=1)
 
     def _shared_size(self, group: NDArray[np.int_], mean: Array, covariance: Array) -> None:
-        """
-        Draw the one size of some coordinates, as `_sizes` does for one, and keep mean and covariance so.
-
-        group: the coordinates.
-        """
+        """Draw the one size of some coordinates, as `_sizes` does; keep mean and covariance so."""
         old, off = self.size[group[0]] ** -2.0, mean[group] - self.middle[group]
         own, columns = covariance[np.ix_(group, group)], covariance[:, group]
         variance, turn = np.linalg.eigh(own)

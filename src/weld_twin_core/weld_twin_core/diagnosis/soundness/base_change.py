@@ -44,17 +44,13 @@ CONSTANTS = np.geomspace(0.05, 0.7, 13)
 class Rest:
     """What frames and arm leave of every sample, and what may have changed while it was measured."""
 
-    residual: Array
-    """Shape (M, c) in units of noise."""
-    basis: Array
-    """Orthonormal: what frames and arm can explain, shape (P, M c)."""
+    residual: Array  # shape (M, c) in units of noise
+    basis: Array  # orthonormal: what frames and arm can explain, shape (P, M c)
     things: Mapping[str, tuple[Array, Array]]
     """What 'base', 'tool' and 'joints' do to every sample, whitened, and to its position [m]."""
-    rows: tuple[int, ...]
-    samples: tuple[int, ...]
-    """Components and samples of every recording."""
-    noise: float
-    """Unit of the positions [m]."""
+    rows: tuple[int, ...]  # components of a sample, by recording
+    samples: tuple[int, ...]  # by recording
+    noise: float  # unit of the positions [m]
 
     def rms(self, k: int) -> float:
         """Return the RMS distance [m] that is left of recording k, as a lag counts it."""
@@ -63,7 +59,6 @@ class Rest:
 
     @cached_property
     def recording(self) -> NDArray[np.int_]:
-        """Return the recording of every sample, shape (M,)."""
         return np.repeat(np.arange(len(self.samples)), self.samples)
 
     @property
@@ -114,7 +109,6 @@ class Change:
         return np.asarray((right * _solved(right, normal)).sum(axis=1))
 
     def best(self, shapes: Sequence[Array]) -> Array:
-        """Return the shape that explains most."""
         return shapes[int(self.gains(np.array(shapes)).argmax())]
 
     def step_gains(self, k: int) -> Array:
@@ -162,11 +156,7 @@ class Change:
 
 
 def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
-    """
-    Return the residual ready to be searched for changes in time.
-
-    ``parts`` are the residuals of the model, (c, M), one per recording.
-    """
+    """Return the residual of a model, (c, M) parts, ready to be searched for changes in time."""
     scale, n, features = _scale(parts), model.robot.n, problem.features(model)
     remaining = _whitened(problem, [part[None] for part in parts], scale)
     arm = _whitened(problem, _of_arm(problem, model, features), scale)
@@ -231,7 +221,6 @@ def _whitened(problem: Problem, parts: Sequence[Array], scale: Scale) -> Array:
 
 
 def _rows(columns: Array) -> Array:
-    """Return (M, c, P) columns as (P, rows)."""
     return np.asarray(columns.reshape(columns.shape[0] * columns.shape[1], -1).T)
 
 

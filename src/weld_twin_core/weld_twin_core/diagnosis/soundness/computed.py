@@ -99,7 +99,6 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
 
 
 def _count(problem: Problem, model: Model) -> int:
-    """Return how many numbers are fitted."""
     return problem.frame_count + problem.shared_count + effect_precision(model).size
 
 

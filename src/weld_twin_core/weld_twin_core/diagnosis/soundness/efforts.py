@@ -57,8 +57,7 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
     """
     Return recordings whose efforts are known to hold the load, or to be it.
 
-    Raises DataError: some recordings have efforts and others none, or none ever changes, or they
-    are in another unit than N m.
+    Raises DataError: some have efforts and others none, none ever changes, or they are not in N m.
     """
     reported = [recording.effort is not None for recording in recordings]
     if not any(reported):
@@ -162,7 +161,6 @@ def _causes_in_words(result: Efforts) -> str:
 
 
 def _weighing(robot: Robot) -> Robot:
-    """Return a robot whose links weigh something: every one alike where none is known."""
     if robot.mass is not None:
         return robot
     return replace(robot, mass=np.ones(robot.n), com=np.zeros((robot.n, 3)))

@@ -64,7 +64,6 @@ class Case:
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
-        """Return the recordings."""
         return self.problem.recordings
 
     @cached_property

@@ -62,14 +62,12 @@ CHECKS: dict[str, tuple[Checker, str]] = {
 class Examined:
     """What the gate found."""
 
-    given: Given
-    """As it came, or mended where mistakes were undone."""
+    given: Given  # as it came, or mended where mistakes were undone
     posed: tuple[Problem, Model] | None
     """To be diagnosed; None where something is wrong that was not undone."""
     checks: tuple[Check, ...]
     unsound: tuple[Unsound, ...]
-    mistakes: tuple[Finding, ...]
-    """Those that were undone."""
+    mistakes: tuple[Finding, ...]  # those that were undone
     slips: tuple[Slip, ...] = ()
     """What seems to have given way at an instant. Of one recording these are causes that ``posed``
     offers the search; of several see `refusing_slips`."""
@@ -87,8 +85,7 @@ class Examined:
 
         A slip counts one time for all recordings, so no search can weigh one of them against the
         library. It is reported only where what the library explains best, ``model``, still leaves it:
-        loops of lost motion and play that the load turns over look like steps until they are
-        fitted.
+        loops of lost motion and play that the load turns over look like steps until they are fitted.
         """
         if len(problem.recordings) < 2 or not self.slips:
             return self
@@ -168,8 +165,6 @@ def _first(mistakes: Sequence[Finding], *, applied: bool) -> list[Check]:
 
 
 class _Look(NamedTuple):
-    """What a look found: the problem, what checks say, mistakes, what gave way, what was mended."""
-
     posed: tuple[Problem, Model] | None = None
     checks: tuple[Check, ...] = ()
     mistakes: list[Finding] = []

@@ -50,7 +50,6 @@ CALIBRATE = 'calibrate the camera, at the focus and zoom that it is used with'
 
 
 def images(case: Case) -> Sequence[Finding]:
-    """Return what is wrong with cameras and targets, by the images and by the arm."""
     seen = [r.images for r in case.recordings if r.images is not None]
     result = [finding for one in seen for finding in _by_themselves(one)]
     if result or not seen:
@@ -105,7 +104,6 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
 
 
 def _undone(before: Fitted, then: Fitted) -> bool:
-    """Return whether images agree much better with what they were said to be."""
     if float(np.abs(then.off).max()) > DOUBT:
         return False
     nearer = float((before.off**2).sum() - (then.off**2).sum())
@@ -115,7 +113,6 @@ def _undone(before: Fitted, then: Fitted) -> bool:
 
 
 def _trials(seen: Sightings) -> Iterator[tuple[Finding, Sightings]]:
-    """Yield mistakes that images show, and the images without them."""
     for one, other in combinations(range(len(seen.cameras)), 2):
         cameras = list(seen.cameras)
         first, second = cameras[one], cameras[other]

@@ -24,11 +24,7 @@ KEPT = 1.0 - 2.0 * FEW
 
 
 class Lag(NamedTuple):
-    """
-    How late measurements are [s] at an instant [s], and how much later with every second.
-
-    ``before`` and ``after`` are the RMS gap [m] without and with the lag.
-    """
+    """How late measurements are [s] at an instant [s], and with every second; RMS gaps [m] with it."""
 
     late: float
     rate: float
@@ -47,8 +43,8 @@ def lag(
     """
     Return how late measurements, (M,) [s] and (M, 3) [m], are against a path, (N,) and (N, 3).
 
-    None when too few to tell. Whatever lag, the path may be turned and shifted, so no base frame
-    is needed. Where ``wide``, lags up to `WIDEST` of the recording are looked at.
+    None when too few to tell. The path may be turned and shifted, so no base frame is needed. Where
+    ``wide``, lags up to `WIDEST` of the recording are looked at.
     """
     span = float(np.ptp(t))
     most = WIDEST * span if wide else min(MOST_LAG, FEW * span)

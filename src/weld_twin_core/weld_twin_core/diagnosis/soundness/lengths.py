@@ -31,12 +31,10 @@ def length(value: float) -> str:
 
 
 def falls(before: float, after: float) -> str:
-    """Return that the gap [m] falls from one length to another."""
     return f'the gap falls from {length(before)} to {length(after)}'
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as a list in a sentence."""
     return ' and '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 

@@ -35,10 +35,8 @@ class Given:
 
     recordings: tuple[Recording, ...]
     robot: Robot
-    align: frozenset[str] = frozenset()
-    """Frames to be fitted: 'base', 'tool'."""
-    may_change: tuple[str, ...] = ()
-    """Families that may differ between the recordings."""
+    align: frozenset[str] = frozenset()  # frames to be fitted: 'base', 'tool'
+    may_change: tuple[str, ...] = ()  # families that may differ between the recordings
 
 
 Mend = Callable[[Given], Given]
@@ -69,18 +67,13 @@ def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
 def _with(
     given: Given, change: Callable[[Recording], Recording], only: int | None = None
 ) -> Given:
-    """Return what was given with all recordings changed, or one."""
     pairs = enumerate(given.recordings)
     made = (change(own) if only in (None, k) else own for k, own in pairs)
     return replace(given, recordings=tuple(made))
 
 
 def positions_as(given: Given, factor: Array) -> Given:
-    """
-    Return what was given with measured positions times a factor per axis, shape (3,).
-
-    A mirrored frame has no orientations; they are left out.
-    """
+    """Return it with measured positions times a factor (3,); a mirrored frame has no orientations."""
 
     def scaled(seen: Measurements) -> Measurements:
         turn = None if np.prod(factor) < 0.0 else seen.rotation
@@ -146,12 +139,10 @@ def robot_as(given: Given, name: str) -> Given:
 
 
 def differing(given: Given, families: tuple[str, ...]) -> Given:
-    """Return what was given with errors of more families that may differ between recordings."""
     return replace(given, may_change=tuple(dict.fromkeys([*given.may_change, *families])))
 
 
 def frames_fitted(given: Given, frames: Iterable[str]) -> Given:
-    """Return what was given with more frames to be fitted."""
     return replace(given, align=given.align | frozenset(frames))
 
 
@@ -168,9 +159,8 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
 
     The measurements keep their stamps, so that every reported instant is in theirs.
 
-    late: how late its measurements are in the middle [s].
+    late: how late its measurements are at the instant ``middle`` on their own clock [s].
     rate: how much later they get with every second of theirs [s/s].
-    middle: the instant that ``late`` belongs to, on the clock of the measurements [s].
     """
 
     def moved(t: Array) -> Array:
@@ -205,8 +195,7 @@ def stamped_evenly(
 
     first, step: the first stamp, and the time from one to the next [s].
     lost: samples before which one is missing.
-    count: how many measurements had these stamps; of as many in the same time as there are now,
-    each takes its share.
+    count: how many measurements had these stamps; others in the same time take their share.
     """
 
     def stamped(seen: Measurements) -> Measurements:
@@ -217,7 +206,6 @@ def stamped_evenly(
 
 
 def velocities_left_out(given: Given, k: int) -> Given:
-    """Return what was given without the joint velocities of recording k."""
     return _with(given, lambda own: replace(own, joints=replace(own.joints, qd=None)), k)
 
 
@@ -255,9 +243,8 @@ def _plain(value: Any) -> Any:
 
 def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0) -> Given:
     """
-    Return what is given after the corrections of a diagnosis.
+    Return what is given after the corrections of a diagnosis, in their order.
 
-    entries: in the order in which they were made.
     given: one recording of the same source, or none for the robot alone.
     which: which recording of that diagnosis it is: some corrections are of one alone.
 

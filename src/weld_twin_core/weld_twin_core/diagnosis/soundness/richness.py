@@ -33,7 +33,6 @@ def motion(case: Case) -> Sequence[Finding]:
 
 
 def _two_arms(case: Case) -> Iterator[Finding]:
-    """Yield that the chain has the joints of two arms."""
     turning = int((~case.model.robot.prismatic).sum())
     if turning >= TWO_ARMS:
         yield note(
@@ -93,11 +92,7 @@ def _frames(case: Case) -> Iterator[Finding]:
 
 
 def quantity(case: Case) -> Sequence[Finding]:
-    """
-    Return a note when there are few stations.
-
-    Raises DataError: there are fewer numbers than a frame has, or nothing moves.
-    """
+    """Return a note on few stations; DataError for fewer numbers than frames have, or no motion."""
     problem = case.problem
     frames = 6 * (len(case.recordings) if 'base' in problem.align else 0)
     frames += (6 if max(problem.rows) == 6 else 3) if 'tool' in problem.align else 0
@@ -126,11 +121,7 @@ def quantity(case: Case) -> Sequence[Finding]:
 
 
 def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> None:
-    """
-    Refuse to judge on measurements that are fitted as well.
-
-    Raises DataError: a held-out recording holds measurements of another, whatever its name.
-    """
+    """Raise DataError where a held-out recording has measurements that are fitted, whatever its name."""
     for held in holdout:
         for recording in recordings:
             if (recording.contacts is None) != (held.contacts is None):

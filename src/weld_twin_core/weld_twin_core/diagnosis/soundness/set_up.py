@@ -113,7 +113,6 @@ def _with_tools(shot: Snapshot) -> Snapshot:
 
 
 def _step(first: Array, other: Array) -> ToolPose:
-    """Return how a tool frame stands against the first one, both shape (4, 4)."""
     turn = rotation_vector(first[:3, :3].T @ other[:3, :3])
     return ToolPose(tuple(other[:3, 3] - first[:3, 3]), tuple(turn))
 

@@ -77,7 +77,6 @@ class Slip:
 
     @property
     def kind(self) -> str:
-        """Return what the list of mistakes calls it."""
         return _WORDS[type(self.effect)][0]
 
     @property
@@ -91,7 +90,6 @@ class Slip:
         return tuple((_WORDS[type(other)][0], (other.at,)) for other in self.others)
 
     def sentence(self, recording: Recording) -> str:
-        """Return what happened, in words."""
         what, when = _WORDS[type(self.effect)][1], instant(recording, self.time)
         out = f'{what.format(self.effect.at)} at {when} of {recording.name}: the tool is '
         out += f'{length(self.size)} off then.'
@@ -100,7 +98,6 @@ class Slip:
 
     @property
     def remedy(self) -> str:
-        """Return what to do about it."""
         return _WORDS[type(self.effect)][3].format(self.effect.at)
 
 
@@ -119,10 +116,7 @@ def changes(
     Return what gave way in the recordings and how the base settled, most evidence first.
 
     A settling is named only where a steady drift does not do as well; what is neither is taken out
-    before the next is looked for.
-
-    problem: the measurements that ``rest`` is of.
-    largest: how far the largest gaps are [m]; nothing moved twice as far.
+    before the next is looked for. Nothing moved twice as far as the largest gaps are [m].
     """
     out: list[Slip | Settling] = []
     taken: list[tuple[int, int]] = []
@@ -158,7 +152,6 @@ class _Trial(NamedTuple):
 
     @property
     def gain(self) -> float:
-        """Return the sum of squares that it explains."""
         return float(self.change.gains(self.shape[None])[0])
 
 

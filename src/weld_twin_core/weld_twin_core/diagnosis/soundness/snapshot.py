@@ -53,11 +53,9 @@ class Snapshot:
 
     @property
     def robot(self) -> Robot:
-        """Return the robot compared with."""
         return self.model.robot
 
     def mended(self, mend: Mend) -> Snapshot:
-        """Return the snapshot after a correction."""
         out = mend(Given(self.recordings, self.robot, self.align))
         model = replace(self.model, robot=out.robot)
         if (out.robot.T_world_base != self.robot.T_world_base).any():
@@ -88,7 +86,6 @@ class Snapshot:
 
     @property
     def turned(self) -> bool:
-        """Return whether every recording has orientations."""
         return all(r.seen.rotation is not None for r in self.recordings)
 
     @property
@@ -99,7 +96,6 @@ class Snapshot:
         return bool(((reads >= low) & (reads <= high)).all())
 
     def gap(self, model: Model) -> float:
-        """Return the median gap [m] that a model leaves."""
         return middle(self.problem.residuals(model))
 
     def rough(self, *, thorough: bool = False) -> Model:
@@ -190,8 +186,8 @@ class Arm(NamedTuple):
     """
     A plausible arm fitted to a snapshot, and the median distance [m] that it leaves.
 
-    ``strain``, (K,), is every error of the arm in units of the most that an arm can have;
-    ``displaced`` how far the frames are off those that were given, in the same units.
+    ``strain``, (K,), is every error in units of the most that an arm can have; ``displaced`` how far
+    the frames are off those that were given, in the same units.
     """
 
     model: Model
@@ -224,11 +220,7 @@ def _strain(robot: Robot, errors: Sequence[Effect]) -> Array:
 
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
-    """
-    Return evenly spread samples of every recording as stations, about a model without effects.
-
-    ``motions`` are the joint positions at the measurements, (M, n) [rad or m], one per recording.
-    """
+    """Return evenly spread samples as stations, joints at them (M, n), about a model without effects."""
     share = max(ENOUGH, SAMPLES // len(problem.recordings))
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):
@@ -240,11 +232,7 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
 
 
 def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[Model]:
-    """
-    Return every snapshot's model after a quick fit of both frames; those of a shape at once.
-
-    Where ``thorough``, the fit starts from many tools.
-    """
+    """Return models after a quick fit of both frames, of many tools if ``thorough``; alike at once."""
     shapes: dict[tuple[object, ...], list[Snapshot]] = {}
     for shot in shots:
         if thorough not in shot._roughly:

@@ -61,7 +61,6 @@ def _velocities(recording: Recording, k: int, names: tuple[str, ...]) -> Iterato
 
 
 def _still(recording: Recording) -> NDArray[np.bool_]:
-    """Return which joints move at velocity zero, shape (n,)."""
     joints = recording.joints
     if joints.qd is None or joints.static:
         return np.zeros(joints.q.shape[1], dtype=bool)

@@ -108,7 +108,6 @@ class _Postures:
         self._keep = np.ones(self._contacts.size, dtype=bool)
 
     def _touched(self) -> Iterator[tuple[str, NDArray[np.int_]]]:
-        """Yield contacts of points and their postures."""
         for contact in self._contacts.artefact.contacts:
             if contact.kind == 'point':
                 yield contact.label, self._contacts.of(contact.label)

@@ -40,26 +40,21 @@ SEED = 3
 class Candidates(NamedTuple):
     """What could have been found."""
 
-    fixed: Array
-    """Whitened columns that are always fitted, shape (P, rows)."""
-    precision: Array
-    """Their prior precision, shape (P,)."""
-    groups: Iterable[Array]
-    """One group is found at a time, shape (E, rows)."""
-    ridges: Sequence[float]
-    """Prior precisions at which it is tried."""
+    fixed: Array  # whitened columns that are always fitted, shape (P, rows)
+    precision: Array  # their prior precision, shape (P,)
+    groups: Iterable[Array]  # one group is found at a time, shape (E, rows)
+    ridges: Sequence[float]  # prior precisions at which it is tried
     ways: Sequence[Array]
     """Ways to divide the rows into parts that are left out in turn, shape (rows,); the one that
     shows least counts."""
 
 
 def noise(rows: int) -> Array:
-    """Return drawings of whitened noise, shape (DRAWS, rows)."""
     return np.random.default_rng(SEED).standard_normal((DRAWS, rows))
 
 
 def may_be_chance(rows: int, gain: float) -> bool:
-    """Return whether the best of many candidates could have gained a share of so many rows of noise."""
+    """Return whether the best of many could have gained a share of so many rows of noise."""
     return rows <= FEW and -rows * float(np.log(max(1.0 - gain, EMPTY))) <= CLEAR
 
 
@@ -116,10 +111,9 @@ def _shares(
     steady: float,
 ) -> Array:
     """
-    Return the share of every target that a group predicts at every ridge, shape (R, K).
+    Return the share of every target that a group predicts at every ridge, shape (R, K), if steady.
 
-    None where it is not steady. Columns beside a fit that is there already change it by no more than
-    their own number of directions.
+    Columns beside a fit that is there already change it by no more than their number of directions.
     """
     beside = group @ rest
     normal, pull = beside @ group.T, group @ remaining
@@ -144,9 +138,7 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     A fit of few stations takes up part of the noise, so that it leaves too little where it was fitted
     and too much elsewhere. One where there are many rows.
 
-    columns: all that is fitted, shape (P, rows).
-    precision: shape (P,).
-    ways: shape (rows,).
+    columns, precision, ways: all that is fitted, (P, rows), (P,); parts of every row, (rows,).
     known: whether the floor is known apart from what the fit leaves.
     """
     rows = columns.shape[1]

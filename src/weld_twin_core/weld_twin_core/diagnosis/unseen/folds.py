@@ -33,8 +33,6 @@ def ways_to_divide(problem: Problem, folds: int = STRETCHES) -> list[Array]:
 
     Stretches of time, then regions of posture; these not where places of contacts are the parts, as
     a place would lie on both sides.
-
-    folds: how many, about.
     """
     by_time = problem.block_labels(folds)
     if problem.untracked and problem.places >= PLACES:
@@ -90,21 +88,16 @@ def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
 class Gain(NamedTuple):
     """What one model takes off the squared error of another on unseen parts."""
 
-    share: float
-    """Share of it."""
-    steady: float
-    """The same in standard errors between parts."""
-    rms_m: float
-    """What is left, RMS [m]."""
+    share: float  # share of it
+    steady: float  # the same in standard errors between parts
+    rms_m: float  # what is left, RMS [m]
 
 
 def gain(before: Array, after: Array, labels: Array, after_labels: Array | None = None) -> Gain:
     """
-    Return what is gained.
+    Return what is gained from squared errors to others, (samples,) [m^2], by parts of samples.
 
-    before, after: squared errors, shape (samples,) [m^2].
-    labels: part of every sample, shape (samples,).
-    after_labels: the same of those after, where other samples are trusted.
+    after_labels: parts of those after, where other samples are trusted.
     """
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
@@ -132,8 +125,6 @@ def parts_of(labels: Sequence[Array]) -> NDArray[np.intp]:
     Return the part of every sample, those of all ways to divide one after the other.
 
     Of eight parts two neighbours together tell more steadily.
-
-    labels: part of every sample, an array for each way to divide the samples.
     """
     parts, first = [], 0
     for each in labels:
@@ -158,10 +149,6 @@ def growth(before: Array, after: Array, parts: NDArray[np.intp]) -> Array:
 
 
 def jackknife(tries: Array) -> Array:
-    """
-    Return the variance of a figure from what it is with each part left out in turn.
-
-    tries: shape (parts, ...).
-    """
+    """Return the variance of a figure by what it is with each part left out, (parts, ...)."""
     count = len(tries)
     return np.asarray((count - 1) / count * ((tries - tries.mean(axis=0)) ** 2).sum(axis=0))

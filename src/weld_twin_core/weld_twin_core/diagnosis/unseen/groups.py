@@ -69,12 +69,10 @@ class Group:
     """One place with one dependence."""
 
     at: str
-    on: str
-    """Place and dependence."""
+    on: str  # place and dependence
     curves: tuple[Effect, ...]
     """What spans it, all values zero; empty where it is spanned by plain columns."""
-    columns: Array
-    """Whitened, together of unit mean square, shape (E, rows)."""
+    columns: Array  # whitened, together of unit mean square, shape (E, rows)
     scales: Array
     """What the columns were divided by, noise per unit of a curve's value, shape (E,)."""
     carriers: tuple[Effect, ...] = ()
@@ -93,18 +91,13 @@ class Group:
         return np.concatenate([np.zeros(0), *(1.0 / (LOOSE * size) ** 2 for size in sizes)])
 
     def __str__(self) -> str:
-        """Return it as people read it."""
         return f'{self.on} at {self.at}' if self.on not in ('constant', self.at) else self.at
 
 
 def all_groups(
     problem: Problem, model: Model, scale: Scale, *, wandering: bool = False
 ) -> Iterator[Group]:
-    """
-    Yield the groups that these data can show at all.
-
-    wandering: whether what a joint loses by its direction may be more and less as time goes on.
-    """
+    """Yield the groups that the data can show; if ``wandering`` losses by direction change with time."""
     features = problem.features(model)
     for at, on, curves in _curved(features, model):
         parts = [problem.effect_columns(features, curve, atoms=False) for curve in curves]

@@ -35,11 +35,7 @@ in a hundred strays, 70 stations have two or more in one recording of six."""
 def held_out_shrink(
     result: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> Shrink:
-    """
-    Return the gap before and after, on the held-out bags or by cross-validation.
-
-    result: the fitted effects and the noise they leave.
-    """
+    """Return the gap before and after, on the held-out bags or by cross-validation."""
     model = result.final.model
     steps, alone = _waterfall(unseen, model)
     turned = unseen.turn_rms(unseen.bare), unseen.turn_rms(unseen.whole)
@@ -68,11 +64,7 @@ def held_out_shrink(
 
 
 def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> float:
-    """
-    Return what the model leaves on held-out recordings, RMS over trusted samples [m].
-
-    result: its final model is judged.
-    """
+    """Return what the final model leaves on held-out recordings, RMS over trusted samples [m]."""
     return float(np.sqrt(_on_bags(result, holdout, beliefs.other_setup)[1].mean()))
 
 
@@ -108,7 +100,6 @@ def _of_others(judged: Sequence[Judged], among: int) -> tuple[float, float]:
 
 
 def _judged(unseen: Unseen) -> Judged:
-    """Return the gap before and after on parts that take their turn."""
     before, after = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     labels = unseen.trusted_labels()
     ratio, interval = ratio_interval(before, after, labels)
@@ -226,14 +217,12 @@ def ratio_interval(
     """
     Return RMS after over before and its 95 % interval, by leaving out one fold at a time.
 
-    Jackknife over folds, so that neighbouring samples do not count as independent. Stretches
-    of one motion say little of another motion: how far the ratio is from that on the recordings
-    fitted, each fold unseen, is one draw of that spread, and its square is added to the
+    Jackknife over folds, so that neighbouring samples do not count as independent. Stretches of one
+    motion say little of another motion: how far the ratio is from that on the recordings fitted
+    (``elsewhere``), each fold unseen, is one draw of that spread, and its square is added to the
     variance.
 
-    before, after: squared errors on unseen data, shape (samples,).
-    labels: shape (samples,).
-    elsewhere: the same ratio on other recordings.
+    before, after, labels: squared errors on unseen data and their folds, shape (samples,).
     farthest: logarithm of a ratio between the two beyond which it widens the interval no further.
     """
     ratio = float(np.sqrt(after.mean() / max(before.mean(), EMPTY)))

@@ -55,14 +55,10 @@ class Unseen:
 
     problem: Problem
     scale: Scale
-    labels: Array
-    """Stretch of every row, shape (rows,)."""
-    columns: Columns
-    """P columns: frames, then the coordinates of every found effect."""
-    parts: tuple[slice, ...]
-    """Columns of every effect."""
-    residual: Array
-    """The final residual, shape (rows,)."""
+    labels: Array  # stretch of every row, shape (rows,)
+    columns: Columns  # P columns: frames, then the coordinates of every found effect
+    parts: tuple[slice, ...]  # columns of every effect
+    residual: Array  # the final residual, shape (rows,)
     taken: Callable[[], Array]
     """Returns what each effect takes off the residual, exactly, shape (K, rows): a run of the twin
     for each, which a model of all effects does not need."""
@@ -76,11 +72,7 @@ class Unseen:
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
-        """
-        Prepare the parts of a fitted model, once.
-
-        precision: prior precision of the fit coordinates, one over variance, shape (K,).
-        """
+        """Prepare the parts of a fitted model, coordinates with a prior precision (K,), once."""
         made: Unseen
         for given, made in fit.prepared:
             same = made.problem is problem and made.scale is scale
@@ -112,7 +104,6 @@ class Unseen:
         return made
 
     def by(self, labels: Array) -> Unseen:
-        """Return the same with other parts left out in turn, told by a label of every row."""
         key = labels.tobytes()
         if key not in self._others:
             self._others[key] = replace(self, labels=labels)
@@ -139,12 +130,7 @@ class Unseen:
         )
 
     def held(self, precision: Array, coordinates: Array) -> Unseen:
-        """
-        Return the same under another prior about zero.
-
-        precision: of every coordinate, one over variance, shape (K,).
-        coordinates: where the fit is, shape (K,).
-        """
+        """Return the same under another prior precision about zero, (K,), coordinates (K,) as fitted."""
         frames = self.frames
         return replace(
             self,
@@ -154,12 +140,10 @@ class Unseen:
 
     @cached_property
     def bare(self) -> Array:
-        """Return the residual on every stretch without any effect, (rows,)."""
         return self.predict([])
 
     @cached_property
     def whole(self) -> Array:
-        """Return the residual on every stretch with all effects, (rows,)."""
         return self.predict(range(len(self.parts)))
 
     def every_way(self) -> list[Unseen]:
@@ -181,7 +165,6 @@ class Unseen:
 
     @property
     def frames(self) -> int:
-        """Return the number of nuisance columns."""
         return int(self.parts[0].start if self.parts else self.columns.count)
 
     def predict(self, kept: Sequence[int]) -> Array:
@@ -206,7 +189,6 @@ class Unseen:
 
     @cached_property
     def _inverses(self) -> list[Array]:
-        """Return the inverse of all normal equations without every stretch."""
         out = []
         for b in range(len(self.spans)):
             system, size = unit_diagonal(self._system(b, np.arange(self.columns.count)), REPEATED)
@@ -216,7 +198,6 @@ class Unseen:
         return out
 
     def base(self, kept: Sequence[int]) -> Base:
-        """Return a model of some effects, fitted with each stretch left out in turn."""
         index, mix, target = self._asked(kept)
         solvers, residual = list[Solver](), target.copy()
         for b, rows in enumerate(self.spans):
@@ -232,11 +213,7 @@ class Unseen:
         return Base(self, kept, index, target, solvers, residual)
 
     def anew(self, b: int, kept: Iterable[int]) -> Array | None:
-        """
-        Return what those effects that a search alone chooses take off beyond now, (rows,).
-
-        Chosen without one stretch; None where there is no such effect.
-        """
+        """Return what the effects that a search alone chooses take off beyond now, (rows,), if any."""
         moved = [self._anew[k][b] for k in kept if k in self._anew]
         return np.sum(moved, axis=0) if moved else None
 
@@ -268,12 +245,10 @@ class Unseen:
 
     @cached_property
     def spans(self) -> list[Rows]:
-        """Return the rows of every stretch."""
         return rows_of(self.labels)
 
     @cached_property
     def stretches(self) -> list[Columns]:
-        """Return the columns of every stretch."""
         return [self.columns.within(rows) for rows in self.spans]
 
     @cached_property
@@ -399,13 +374,11 @@ class Unseen:
         return float(np.sqrt((np.concatenate(parts) ** 2).sum(axis=1).mean())) if parts else None
 
     def trusted_labels(self) -> Array:
-        """Return the stretch of every trusted sample."""
         rows = self.problem.by_sample(self.labels)
         return np.concatenate([part[:, 0] for part in self._trusted(rows)])
 
     @cached_property
     def _good(self) -> list[NDArray[np.bool_]]:
-        """Return which samples are judged, (M,) per recording."""
         return trusted(self.scale.weights)
 
     @cached_property
@@ -413,7 +386,6 @@ class Unseen:
         return np.concatenate(self._trusted(list(self.scale.weights)))
 
     def _trusted(self, parts: list[Array]) -> list[Array]:
-        """Return the rows of trusted samples, (m, c) per recording."""
         return [part[good] for part, good in zip(parts, self._good, strict=True)]
 
 
@@ -429,11 +401,7 @@ class Base:
     residual: Array
 
     def gain(self, extra: Array) -> Gain:
-        """
-        Return what further columns take off at the best of a few ridges.
-
-        extra: of unit mean square, shape (E, rows).
-        """
+        """Return what columns of unit mean square, (E, rows), take off at the best of a few ridges."""
         labels, before = self._known
         tried = self.extended(extra, RIDGES)
         return max(gain(before, self.unseen.squares(after), labels) for after in tried)
@@ -444,16 +412,10 @@ class Base:
 
     @cached_property
     def _known(self) -> tuple[Array, Array]:
-        """Return stretch and squared error of every trusted sample."""
         return self.unseen.trusted_labels(), self.unseen.squares(self.residual)
 
     def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
-        """
-        Return the unseen residual with further columns, one array (rows,) for every ridge.
-
-        extra: shape (E, rows).
-        ridges: prior precision of the further columns.
-        """
+        """Return the unseen residual with further columns (E, rows), (rows,) for every ridge."""
         spans = self.unseen.spans
         both = np.concatenate([extra, self.target[None]])
         crosses = [own.products(both[:, rows]) for own, rows in zip(self._own, spans, strict=True)]
@@ -483,7 +445,6 @@ class Base:
 
     @cached_property
     def _own(self) -> list[Columns]:
-        """Return the columns of the model on every stretch."""
         return [part.chosen(self.index) for part in self.unseen.stretches]
 
 

@@ -52,9 +52,8 @@ STRETCHES = 12
 
 def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Where:
     """
-    Return where the gap lies.
+    Return where the gap lies, of the model before any effect was found.
 
-    result: its baseline is the model before any effect was found.
     found: what groups without a formula take off the whole gap.
     causes: of the answer, if there are any: joints and regimes are then theirs, so that they say
     what the answer says, also where a cause sits at no joint or its place is not certain.
@@ -145,12 +144,7 @@ MOST_DEPENDENCES = 3
 
 
 def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> Structure:
-    """
-    Return what groups without a formula add in folds not used for fitting.
-
-    unseen: of the model.
-    baseline: of the model without any effect that was found.
-    """
+    """Return what groups without a formula add to a model, in folds not used for fitting."""
     problem = unseen.problem
     bare = Unseen.of(problem, unseen.scale, baseline, np.zeros(0))
     base, first = (each.base(range(len(each.parts))) for each in (unseen, bare))

@@ -10,7 +10,7 @@ import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.algebra.columns import Columns, Maker
+from weld_twin_core.diagnosis.algebra.columns import Columns, Maker, Piece
 from weld_twin_core.diagnosis.algebra.fit import TRUSTED, fit, trusted
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.algebra.starts import started
@@ -43,7 +43,7 @@ def made_up(columns, blocks, seed=0, rows=640, parts=3, prior=0.0):
     precision = np.concatenate([np.zeros(2), rng.uniform(0.0, prior, columns - 2)])
     pull = precision * rng.normal(size=columns)
     told = targets[0], lambda: targets[1:]
-    return Unseen(None, None, labels, Columns.of(a), slices, *told, precision, pull)
+    return Unseen(None, None, labels, Columns((Piece(a),)), slices, *told, precision, pull)
 
 
 def refitted(unseen, kept, extra=None, ridge=0.0):
@@ -152,7 +152,7 @@ def test_a_model_without_frames_and_effects_predicts_its_target():
         None,
         None,
         unseen.labels,
-        Columns.of(np.zeros((0, unseen.labels.size))),
+        Columns((Piece(np.zeros((0, unseen.labels.size))),)),
         (),
         unseen.residual,
         lambda: np.zeros((0, unseen.labels.size)),
@@ -260,7 +260,7 @@ def test_what_one_stretch_alone_shows_stays_put_elsewhere():
     columns, target = np.concatenate([steady[None], spikes]), 2.0 * steady
     none = np.zeros(len(columns))
     told = target, lambda: np.zeros((0, labels.size))
-    unseen = Unseen(None, None, labels, Columns.of(columns), (), *told, none, none)
+    unseen = Unseen(None, None, labels, Columns((Piece(columns),)), (), *told, none, none)
     left = unseen.base([]).residual
     np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)
 

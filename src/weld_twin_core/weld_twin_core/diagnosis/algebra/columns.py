@@ -143,11 +143,6 @@ class Columns:
     pieces: tuple[Piece, ...]
 
     @classmethod
-    def of(cls, rows: Array) -> Columns:
-        """Return columns that are written out, shape (P, rows)."""
-        return cls((Piece(rows),))
-
-    @classmethod
     def joined(cls, pieces: Sequence[Piece]) -> Columns:
         """Return columns in few pieces, in the same order, so that products are few and large."""
         out = []

@@ -36,11 +36,7 @@ FLAT = 1e-9
 
 
 def inverted(matrix: Array) -> Array:
-    """
-    Return the inverse of a symmetric matrix, which is overwritten, shape (P, P).
-
-    Raises LinAlgError: the matrix is not positive definite.
-    """
+    """Return the inverse of a matrix, as of `root_of`, which is overwritten; else LinAlgError."""
     return inverse_of(root_of(matrix))
 
 

@@ -36,16 +36,17 @@ ROWS = 3000
 
 
 class Open(NamedTuple):
-    """Directions that data hardly show: names of frame columns; steps [m, rad] as columns (F, k)."""
+    """Directions that data hardly show: frame columns, visible sizes (F,), steps (F, k) [m, rad]."""
 
     names: list[str]
+    size: Array
     vectors: Array
 
 
 def open_directions(problem: Problem, model: Model) -> Open:
     """Return the directions of the aligned frames in which a visible error would not show."""
     names, size, strength, vectors = shown(problem, model)
-    return Open(names, size[:, None] * vectors[:, strength < 1.0])
+    return Open(names, size, size[:, None] * vectors[:, strength < 1.0])
 
 
 def shown(
@@ -117,9 +118,8 @@ def _closed_step(
     frames = len(free.names)
     own, moved = frame_prior(problem, model)
     x = np.concatenate([moved[frames:], coordinates(model)])
-    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in free.names])
-    span, _, _ = np.linalg.svd(free.vectors / size[:, None])
-    closed = size[:, None] * span[:, free.vectors.shape[1] :]
+    span, _, _ = np.linalg.svd(free.vectors / free.size[:, None])
+    closed = free.size[:, None] * span[:, free.vectors.shape[1] :]
     mixed = np.concatenate([closed.T @ columns[:frames], columns[frames:]])
     ridge = np.zeros(mixed.shape[0])
     pull = np.zeros(mixed.shape[0])

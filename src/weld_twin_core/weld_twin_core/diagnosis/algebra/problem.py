@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...arm.channels import Shift
 from ...arm.robot import Robot
 from ...arm.rotation import angle_between, rotation_matrix
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
@@ -390,7 +390,7 @@ class Problem:
                 out.append(recording)
                 continue
             count = max(2, round(measured.t.size / factor))
-            index = np.unique(np.linspace(0, measured.t.size - 1, count).round().astype(int))
+            index = spread_over(measured.t.size, count)
             out.append(recording.with_measured(measured.take(index)))
         return replace(self, recordings=tuple(out))
 
@@ -398,11 +398,8 @@ class Problem:
         thin = self.thinned(most_rows)
         if thin is self:
             return self, scale
-        kept = []
-        for full, part, weight in zip(
-            self.recordings, thin.recordings, scale.weights, strict=True
-        ):
-            kept.append(weight[np.searchsorted(full.seen.t, part.seen.t)])
+        each = zip(self.recordings, thin.recordings, scale.weights, strict=True)
+        kept = (w[np.searchsorted(full.seen.t, part.seen.t)] for full, part, w in each)
         return thin, replace(scale, weights=tuple(kept))
 
     def unit_scale(self) -> Scale:

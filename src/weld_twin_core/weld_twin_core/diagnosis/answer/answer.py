@@ -195,8 +195,8 @@ def _traces(result: Search) -> Traces:
     before = result.problem.residuals(result.baseline.model)
     after = result.problem.residuals(result.final.model)
     return Traces(
-        t=tuple(r.measured.t for r in recordings if r.measured is not None),
-        measured=tuple(r.measured.position for r in recordings if r.measured is not None),
+        t=tuple(r.seen.t for r in recordings),
+        measured=tuple(r.seen.position for r in recordings),
         before=tuple(p[:3].T for p in before),
         after=tuple(p[:3].T for p in after),
         trusted=tuple(trusted(result.scale.weights)),

@@ -62,6 +62,7 @@ class _Shelf:
         self.pieces: list[Piece] = []
         self.units: list[Unit] = []
         self._count = 0
+        self._still: dict[str, dict[str, None]] = {}
         self._maker = Maker(problem, self.features, scale)
         self._residual = problem.whitened(problem.residuals(model), scale)
         self._ends = np.cumsum(problem.samples)
@@ -109,12 +110,9 @@ class _Shelf:
 
     def _leave_out(self, family: str, joint: str) -> None:
         """Tell that a joint, too, hardly moves."""
-        reported = self.absent.get(family, '')
-        others = (
-            reported.removeprefix(f'{REASON} (').rstrip(')') if reported.startswith(REASON) else ''
-        )
-        joints = [*filter(None, others.split(', ')), joint]
-        self.absent[family] = f'{REASON} ({", ".join(dict.fromkeys(joints))})'
+        still = self._still.setdefault(family, {})
+        still[joint] = None
+        self.absent[family] = f'{REASON} ({", ".join(still)})'
 
     def place(
         self, site: Site, seeds: Sequence[Effect], trials: float, role: Role = Role.FOUND

@@ -110,12 +110,12 @@ def free_form(
     fitted = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
     work = Choosing(groups, [fitted.by(each) for each in labels])
     members = chosen(work, beliefs)
-    parts, total = [], worth(work, members)
+    parts, (shares, gain, steady) = [], worth(work, members)
     for k, member in enumerate(members):
         weights = alternative_weights(work, members, k, beliefs)
         alternatives = tuple((groups[g], w) for g, w in weights if w > 0.0)
-        parts.append(Part(groups[member.group], member.ridge, alternatives, total.shares[k]))
-    return FreeForm(tuple(parts), total.gain, total.steady)
+        parts.append(Part(groups[member.group], member.ridge, alternatives, shares[k]))
+    return FreeForm(tuple(parts), gain, steady)
 
 
 class Member(NamedTuple):
@@ -226,15 +226,13 @@ def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Mem
     return members
 
 
-class Worth(NamedTuple):
-    """What the groups chosen take off the squared error on unseen folds."""
+def worth(work: Choosing, members: list[Member]) -> tuple[tuple[float, ...], float, float]:
+    """
+    Return what is lost without each group, what all gain, on unseen folds, and how steadily.
 
-    shares: tuple[float, ...]  # of each, what is lost without it; together they make up ``gain``
-    gain: float  # share that all of them take away, by the way of dividing that shows least
-    steady: float  # that fall in its standard errors between folds
-
-
-def worth(work: Choosing, members: list[Member]) -> Worth:
+    Shares of the squared error, that of all by the way of dividing that shows least, and what each
+    loses of it; and the fall in its standard errors between folds.
+    """
     none, now = work.errors([]), work.errors(members)
     gain = max(_worst_gain(none, now), 0.0)
     steady = min(steadiness(a, b) for a, b in zip(none, now, strict=True))
@@ -242,7 +240,7 @@ def worth(work: Choosing, members: list[Member]) -> Worth:
     losses = np.array([max(sum(float(e.sum()) for e in errors), 0.0) for errors in less])
     losses = np.maximum(losses - sum(float(e.sum()) for e in now), 0.0)
     whole = max(float(losses.sum()), EMPTY)
-    return Worth(tuple(float(gain * loss / whole) for loss in losses), gain, steady)
+    return tuple(float(gain * loss / whole) for loss in losses), gain, steady
 
 
 def alternative_weights(

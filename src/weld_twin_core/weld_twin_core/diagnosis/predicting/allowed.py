@@ -28,9 +28,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg.lapack import dtrtri
 
-from ...arrays import Array
+from ...arrays import Array, spread_over
 from ...effects.dated import of_the_robot
-from ...recording import Recording
 from ...twin.directions import Directions
 from ...twin.domain import Domain
 from ...twin.jumps import shown
@@ -41,7 +40,7 @@ from ..algebra.definite import EMPTY, FLAT, inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
-from ..algebra.open_directions import AXES, VISIBLE, in_words, open_directions
+from ..algebra.open_directions import AXES, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..result import Shrink
 from ..unseen.folds import posture_regions
@@ -144,15 +143,15 @@ def _directions(problem: Problem, model: Model) -> Directions:
         tuple(frame for frame in ('base', 'tool') if frame in problem.align),
         len(problem.recordings),
         plausible_arm.directions(model.robot, model.found),
-        plausible_arm.fine_knots([_joints(r) for r in problem.recordings]),
+        plausible_arm.fine_knots(_joints(problem)),
         0 if problem.at_rest else model.robot.n,
     )
 
 
 def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:
     """Return the posterior with its usual size where it was recorded, and anywhere."""
-    seen = np.concatenate([_joints(r) for r in problem.recordings])
-    spread = np.linspace(0, seen.shape[0] - 1, min(seen.shape[0], POSTURES)).round().astype(int)
+    seen = np.concatenate(_joints(problem))
+    spread = spread_over(len(seen), POSTURES)
     anywhere = postures_within_limits(model.robot, POSTURES)
     return replace(
         posterior,
@@ -184,9 +183,8 @@ def _expected(problem: Problem, scale: Scale) -> float:
     return float((LEAST_NOISE / scale.position) ** 2)
 
 
-def _joints(recording: Recording) -> Array:
-    measured = recording.measured
-    return recording.joints.at(recording.joints.t if measured is None else measured.t)[0]
+def _joints(problem: Problem) -> list[Array]:
+    return [r.joints.at(r.seen.t)[0] for r in problem.recordings]
 
 
 def _rows(problem: Problem, model: Model, scale: Scale, what: Directions, prior: Prior) -> Rows:
@@ -311,10 +309,9 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     """
     unseen = problem.untracked and not problem.placed
     result = open_directions(problem, model)
-    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in result.names])
     out = [f'base {axis}' for axis in AXES] if unseen else []
     for vector in result.vectors.T:
-        share = np.abs(vector / size)
+        share = np.abs(vector / result.size)
         order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]
         out.append(' with '.join(in_words(result.names[i]) for i in order[:MOST]))
     return tuple(out)

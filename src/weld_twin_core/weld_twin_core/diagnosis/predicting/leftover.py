@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from ...arrays import Array
-from ...recording import Recording
+from ...arrays import Array, spread_over
 from ...twin.reversals import just_turned
 from ..algebra.definite import EMPTY, REPEATED, unit_diagonal
 from ..algebra.fit import trusted
@@ -308,9 +307,9 @@ def _at_turns(problem: Problem, predicted: Predicted, lost: Array) -> Array:
 def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
     """Return which joints have just turned at the samples of a recording; none where it touched."""
     recording = problem.recordings[k]
-    if recording.measured is None or problem.contact(k) is not None:
+    if problem.contact(k) is not None:
         return np.zeros((problem.samples[k], recording.joints.q.shape[1]), dtype=bool)
-    return just_turned(recording.joints, recording.measured.t)
+    return just_turned(recording.joints, recording.seen.t)
 
 
 def _of_the_arm(
@@ -345,7 +344,7 @@ def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bo
     Of all gears alike, or of one alone. An instrument is less sure along some directions than along
     others, and these stay where they are; levers turn with the arm.
     """
-    few = np.unique(np.linspace(0, len(errors) - 1, min(len(errors), MOST)).round().astype(int))
+    few = spread_over(len(errors), MOST)
     errors, moments, levers = errors[few], moments[few], levers[few]
     best = (-np.inf, 0.0, np.zeros(turning.size))
     singles = np.eye(turning.size)[turning]
@@ -433,17 +432,12 @@ def _neighbours(
         for size in NEIGHBOURS:
             yield size, here, np.arange(0, here.size, size)
         return
-    q = np.concatenate([_postures(r) for r in problem.recordings])[here]
+    q = np.concatenate([r.joints.at(r.seen.t)[0] for r in problem.recordings])[here]
     apart = ((q[:, None] - q[None]) ** 2).sum(axis=2)
     np.fill_diagonal(apart, np.inf)
     pairs = np.stack([np.arange(here.size), apart.argmin(axis=1)], axis=1)
     pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     yield 2, here[pairs.ravel()], np.arange(0, pairs.size, 2)
-
-
-def _postures(recording: Recording) -> Array:
-    assert recording.measured is not None
-    return recording.joints.at(recording.measured.t)[0]
 
 
 def _size(errors: Array, moments: Array, shape: Array) -> float:
@@ -475,11 +469,7 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
 
 def known_noise(problem: Problem, floor: NoiseFloor) -> float | None:
     """Return the instrument's noise [m], given with the data or seen in them; None without."""
-    reported = [
-        float(np.median(r.measured.sigma))
-        for r in problem.recordings
-        if r.measured is not None and r.measured.sigma is not None
-    ]
-    if reported:
+    given = (recording.seen.sigma for recording in problem.recordings)
+    if reported := [float(np.median(sigma)) for sigma in given if sigma is not None]:
         return float(np.mean(reported))
     return floor.sigma if floor.independent else None

@@ -126,11 +126,10 @@ class Case:
         return out
 
     def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:
-        out = []
-        for recording, late in zip(self.recordings, lags, strict=True):
-            t = recording.seen.t
-            out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
-        return out
+        return [
+            r.joints.at(r.seen.t if late is None else r.seen.t - late.at(r.seen.t))[0]
+            for r, late in zip(self.recordings, lags, strict=True)
+        ]
 
     @cached_property
     def motions(self) -> list[Array]:

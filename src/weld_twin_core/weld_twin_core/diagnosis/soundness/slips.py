@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -275,5 +276,4 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
     return best._replace(others=tuple(t.effect for t in enough if t is not best and t.effect))
 
 
-def _sure(trial: _Trial) -> float:
-    return trial.sure
+_sure = attrgetter('sure')

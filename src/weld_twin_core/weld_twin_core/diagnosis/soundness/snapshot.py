@@ -98,10 +98,6 @@ class Snapshot:
     def gap(self, model: Model) -> float:
         return middle(self.problem.residuals(model))
 
-    def rough(self, *, thorough: bool = False) -> Model:
-        """Return the model after a quick fit of both frames; thorough: from many starts."""
-        return rough_models([self], thorough=thorough)[0]
-
     @cached_property
     def _roughly(self) -> dict[bool, Model]:
         return {}
@@ -126,7 +122,7 @@ class Snapshot:
     @cached_property
     def framed(self) -> Model:
         """Return the model with both frames fitted, wherever they are."""
-        starts = (self.model, self.rough(thorough=True))
+        starts = (self.model, *rough_models([self], thorough=True))
         return min((refined(self.problem, start) for start in starts), key=self.gap)
 
     def bent(
@@ -221,8 +217,7 @@ def _strain(robot: Robot, errors: Sequence[Effect]) -> Array:
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
     """Return evenly spread samples as stations, joints at them (M, n), about a model without effects."""
-    share = max(ENOUGH, SAMPLES // len(problem.recordings))
-    out = []
+    share, out = max(ENOUGH, SAMPLES // len(problem.recordings)), []
     for recording, q in zip(problem.recordings, motions, strict=True):
         seen = recording.seen
         index = spread_over(seen.t.size, share)

@@ -49,13 +49,9 @@ def posture_regions(problem: Problem) -> Array:
     recordings have bases of their own, one that lies in one region for the most part is dealt out
     over all of them: its base could not be told from the other regions.
     """
-    postures = np.concatenate(
-        [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
-    )
+    postures = np.concatenate([r.joints.at(r.seen.t)[0] for r in problem.recordings])
     # Where a joint stands alike, what was measured decides: not which recording was given first.
-    seen = np.concatenate(
-        [r.measured.position.T for r in problem.recordings if r.measured is not None], axis=1
-    )
+    seen = np.concatenate([r.seen.position.T for r in problem.recordings], axis=1)
     labels = np.zeros(postures.shape[0], dtype=int)
     for _ in range(int(np.log2(STRETCHES))):
         after = labels * 2
@@ -67,11 +63,7 @@ def posture_regions(problem: Problem) -> Array:
         labels = after
     if problem.own_bases:
         labels = _keeping_bases(labels, problem.samples)
-    rows, at = [], 0
-    for c, m in zip(problem.rows, problem.samples, strict=True):
-        rows.append(np.repeat(labels[at : at + m], c))
-        at += m
-    return np.concatenate(rows)
+    return np.repeat(labels, np.repeat(problem.rows, problem.samples))
 
 
 def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:

@@ -361,7 +361,8 @@ class Unseen:
         for root, part in zip(self.problem.roots, self.problem.by_sample(residual), strict=True):
             rows = part[:, :3] if root is None else part * np.sqrt(3 / part.shape[1])
             out.append((rows**2).sum(axis=1) * self.scale.position**2)
-        return np.concatenate(self._trusted(out)) / self._trusted_weights
+        weights = self._trusted(list(self.scale.weights))
+        return np.concatenate(self._trusted(out)) / np.concatenate(weights)
 
     def rms(self, residual: Array) -> float:
         """Return the RMS position error over trusted samples, [m]."""
@@ -380,10 +381,6 @@ class Unseen:
     @cached_property
     def _good(self) -> list[NDArray[np.bool_]]:
         return trusted(self.scale.weights)
-
-    @cached_property
-    def _trusted_weights(self) -> Array:
-        return np.concatenate(self._trusted(list(self.scale.weights)))
 
     def _trusted(self, parts: list[Array]) -> list[Array]:
         return [part[good] for part, good in zip(parts, self._good, strict=True)]

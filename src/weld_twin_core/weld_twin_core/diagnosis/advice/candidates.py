@@ -60,8 +60,6 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A measurement that could be made."""
-
     kind: str
     sentence: str  # the sentence has ``{count}`` where the number of stations goes
     set_up: float  # what has to be changed in the cell first [min]
@@ -136,7 +134,6 @@ class _Here:
         )
 
     def at_rest(self) -> Iterator[Candidate]:
-        """Yield stations, and stations approached from both sides."""
         yield self._stations(
             'stations',
             'Measure {count} stations at rest, spread over a wider part of the workspace.',
@@ -153,7 +150,6 @@ class _Here:
         )
 
     def pressed(self) -> Candidate:
-        """Return stations with a force on the tool, along each axis in turn."""
         whole = self.spread[: len(self.spread) // 3 * 3]
         made = self._stations(
             'press',
@@ -169,7 +165,6 @@ class _Here:
         return replace(made, recordings=(replace(recording, wrench=push, wrench_frame='base'),))
 
     def warm_up(self) -> Candidate:
-        """Return a few stations again and again, while it grows warmer."""
         again = np.concatenate([self.spread[:5]] * 12)
         sentence = 'Measure five stations again and again for an hour while the arm warms up.'
         made = self._stations('warm_up', sentence, again, len(again), seconds=_SOAK)
@@ -181,7 +176,6 @@ class _Here:
         return replace(made, whole=True)
 
     def changed(self) -> Iterator[Candidate]:
-        """Yield the same stations with something changed in the cell."""
         robot, words = self.model.robot, 'Measure {count} stations'
         more = f'{words} with {MASS:g} kg more hung from the tool point.'
         heavy = replace(robot, payload_mass=robot.payload_mass + MASS)

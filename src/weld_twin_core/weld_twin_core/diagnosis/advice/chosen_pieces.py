@@ -104,7 +104,6 @@ class Plan:
 
     @property
     def robot_minutes(self) -> float:
-        """Return how long the arm moves [min]."""
         if self.candidate.static:
             t = self.motion().t
             return float(t[-1] + self._step) / 60.0

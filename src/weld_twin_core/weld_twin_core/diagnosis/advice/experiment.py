@@ -183,7 +183,6 @@ def _apart(first: _Explanation, second: _Explanation) -> tuple[list[Effect], lis
 
 
 def _side(effects: Sequence[Effect]) -> list[dict[str, str | None]]:
-    """Return effects as plain values, each once."""
     each = (
         {'effect': e.name, 'joint': str(e.site) if e.site else None, 'at': e.at, 'on': e.on}
         for e in effects

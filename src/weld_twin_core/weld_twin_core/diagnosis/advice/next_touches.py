@@ -329,7 +329,6 @@ class _Option(NamedTuple):
     def of(
         cls, before: Design, touches: list[_Touchable], place: Array | None, weight: Array
     ) -> _Option:
-        """Return touches put in order by what they tell of weighed errors."""
         order, after = chosen(before, np.concatenate([t.rows for t in touches]), weight, MOST)
         return cls(touches, place, order, [before, *after])
 

@@ -126,7 +126,6 @@ def partings(
 
 
 def _of_piece(stack: Array, side: Side, piece: Piece) -> Array:
-    """Return the rows of one piece of a recording."""
     if piece.rows is None:
         return stack
     at = np.add.outer(np.array(piece.rows) * side.rows, np.arange(side.rows))

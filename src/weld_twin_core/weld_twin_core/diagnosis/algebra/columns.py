@@ -156,7 +156,6 @@ class Columns:
 
     @cached_property
     def places(self) -> tuple[slice, ...]:
-        """Return where the columns of every piece are."""
         ends = np.cumsum([0, *(piece.count for piece in self.pieces)]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
@@ -168,7 +167,6 @@ class Columns:
         return np.concatenate([piece.written_out() for piece in self.pieces])
 
     def normal(self) -> Array:
-        """Return the products of all columns with each other, shape (P, P)."""
         out = np.empty((self.count, self.count))
         for k, (piece, here) in enumerate(zip(self.pieces, self.places, strict=True)):
             out[here, here] = piece.normal()
@@ -178,7 +176,6 @@ class Columns:
         return out
 
     def products(self, rows: Array) -> Array:
-        """Return the products with other rows, shape (R, rows), as shape (P, R)."""
         return np.concatenate([piece.products(rows) for piece in self.pieces])
 
     def times(self, row: Array) -> Array:
@@ -186,13 +183,11 @@ class Columns:
         return self.products(row[None])[:, 0]
 
     def mixed(self, weights: Array) -> Array:
-        """Return sums of the columns with weights, shape (..., P), as shape (..., rows)."""
         parts = zip(self.pieces, self.places, strict=True)
         out = [piece.mixed(weights[..., here]) for piece, here in parts]
         return np.asarray(sum(out[1:], start=out[0]))
 
     def peaks(self) -> Array:
-        """Return the largest entry of every column, by size, shape (P,)."""
         return np.concatenate([piece.peaks() for piece in self.pieces])
 
     def chosen(self, index: Index) -> Columns:
@@ -205,7 +200,6 @@ class Columns:
         return Columns(tuple(Piece(piece.each[mine], piece.joint) for piece, mine in some))
 
     def within(self, rows: Rows) -> Columns:
-        """Return the columns on some rows, all those of a sample or none."""
         return Columns(tuple(piece.within(rows) for piece in self.pieces))
 
 

@@ -47,19 +47,13 @@ TRUSTED = 0.2
 SET_ASIDE = 0.02
 """Share of the samples that may be outliers; beyond that they are structure."""
 STRAY = 20.0
-"""
-Robust deviations from which a sample is a stray: twice what the data check calls far off.
-
-What a missing effect does to some postures widens the deviation that it is measured in.
-"""
+"""Robust deviations from which a sample is a stray: twice what the data check calls far off. What a
+missing effect does to some postures widens the deviation that it is measured in."""
 STRAYS, STRAYS_TOGETHER = 0.1, 2
 """Share of the samples that may be strays, and how many in a row: more are a set-up that moved."""
 LEAST_TURN = 0.5
-"""
-Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres.
-
-Exact orientations, as a simulated cell gives, would otherwise drown every position.
-"""
+"""Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres. Exact
+orientations, as a simulated cell gives, would otherwise drown every position."""
 
 STRAINED = 1.0
 """Squared distance from what is believed, in standard deviations, from which on that may hold back."""
@@ -74,8 +68,6 @@ KEPT = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted model."""
-
     model: Model
     residual: Array  # whitened residual at the solution, shape (rows,)
     prepared: list[Any] = field(default_factory=list, init=False, repr=False)
@@ -360,7 +352,6 @@ def robust_fit(
 
 
 def with_weights(scale: Scale, problem: Problem) -> Scale:
-    """Return the scale with unit weights for another problem's samples."""
     return replace(scale, weights=tuple(np.ones(m) for m in problem.samples))
 
 

@@ -3,9 +3,8 @@
 """
 What motions can show: those recorded, of joints that hardly move; and what none can, whatever it is.
 
-Of a joint at rest a constant shows. Constant errors that no motion tells apart follow from the arm
-itself: the offset of the first link lifts the tool exactly as a higher base does. Errors are compared
-by what they do to the tool in postures all over the arm's range.
+Of a joint at rest a constant shows. What no motion tells apart follows from the arm itself, in
+postures all over its range: the offset of the first link lifts the tool exactly as a higher base does.
 """
 
 from __future__ import annotations

@@ -21,17 +21,12 @@ SAME_STATION = 2e-3
 ENOUGH = 12
 """Samples, or repeats, from which on a median tells the noise to a quarter."""
 WIDEST = 3.5e-4
-"""
-Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's.
-
-Trackers have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to
-show by itself, in repeats or differences, or be given with the data: a misfit looks the same.
-"""
+"""Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's. Trackers
+have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to show by
+itself, in repeats or differences, or be given with the data: a misfit looks the same."""
 
 
 class NoiseFloor(NamedTuple):
-    """What the instrument's noise alone would leave."""
-
     sigma: float  # standard deviation of one measured coordinate, [m]
     independent: bool  # whether repeats or differences in time showed it, not what a model left
 

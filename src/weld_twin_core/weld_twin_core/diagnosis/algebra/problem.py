@@ -530,7 +530,6 @@ class Model:
         return replace(self, bases=tuple(bases))
 
     def retooled(self, step: Array) -> Model:
-        """Return the model with the tool moved by (xyz, rotvec)."""
         tool = _moved(self.robot.T_flange_tool, step, left=False)
         return replace(self, robot=self.robot.with_frames(tool=tool))
 
@@ -577,8 +576,6 @@ def _moved(frame: Array, step: Array, *, left: bool) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """Where the frames are believed to be."""
-
     bases: tuple[Array, ...]  # shape (4, 4)
     tool: Array  # shape (4, 4)
     of: frozenset[str] = frozenset({'base', 'tool'})  # frames of which that is believed

@@ -81,8 +81,6 @@ class Alike(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SeedSystems:
-    """Normal equations of all seeds."""
-
     alike: tuple[Alike, ...]  # one entry for every number of columns
     rss: float = 0.0  # sum of squares of the residual
 
@@ -222,7 +220,6 @@ class Choice:
 
     @cached_property
     def columns(self) -> Index:
-        """Return the numbers of the columns that earn their place."""
         return np.asarray(self.alike.columns[self.row][self.chosen])
 
     def effect(self) -> Effect:
@@ -273,8 +270,6 @@ def ranking(
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Columns of every unit."""
-
     columns: Columns  # all of them, in the order of their numbers
     systems: SeedSystems  # the normal matrix of every seed
     units: tuple[Unit, ...]

@@ -99,7 +99,6 @@ def answer(
 
 
 def _model(result: Search, effects: Sequence[Found]) -> Model:
-    """Return the model, with what of it is named."""
     named = tuple((each.effect.name, each.effect.site) for each in effects)
     return replace(result.final.model, named=named)
 
@@ -145,7 +144,6 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
 
 
 def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
-    """Return what differs between the recordings beyond noise, by recording."""
     if not families:
         return ()
     return list_changes(
@@ -154,7 +152,6 @@ def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
 
 
 def _undetectable_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
-    """Return a note of what may have changed without being seen."""
     names = list_undetectable(result.problem, result.final.model, families)
     if not names:
         return ()
@@ -190,7 +187,6 @@ def _gap(result: Search, floor: float) -> Gap:
 
 
 def _traces(result: Search) -> Traces:
-    """Return the position residuals before and after, sample by sample."""
     recordings = result.problem.recordings
     before = result.problem.residuals(result.baseline.model)
     after = result.problem.residuals(result.final.model)

@@ -3,14 +3,13 @@
 """
 The effects that a verdict names, with their standard errors, and how sure the shares of causes are.
 
-A standard error is the larger of what the covariance of `algebra.columns` and other optima that fit
-nearly as well give, with what idealised formulas add in squares; or that of the models that the
-recordings allow besides, in which an arm has a little of every small error, where it is larger.
+A standard error is the largest of what the covariance and other optima that fit nearly as well give,
+with what idealised formulas add in squares, and of the models that the recordings allow besides.
 
-Of a share three doubts are drawn together: the coordinates of all causes, which hang together as their
-columns do; how much of what is left above the noise belongs to the causes; and how large the noise is
-and how it happens to lie along the gap. Members of a set move the tool alike: which of them it is
-changes no share. Every draw is parted as the shares themselves are.
+Of a share three doubts are drawn together: the coordinates of all causes, as their columns hang
+together; how much of what is left above the noise is the causes'; how large the noise is and how it
+lies along the gap. Which member of a set is at work changes no share. Every draw is parted as the
+shares themselves are.
 """
 
 from __future__ import annotations
@@ -154,7 +153,6 @@ def _free(model: Model) -> NDArray[np.bool_]:
 
 
 def _visible(columns: Columns, model: Model) -> NDArray[np.bool_]:
-    """Return which columns the data show, shape (P,)."""
     scales = np.concatenate([effect.fit.coordinate_scales() for effect in model.found])
     reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
     return np.asarray(columns.peaks() * reach > SHOWN)
@@ -209,7 +207,6 @@ def with_intervals(
 
 
 def _with_interval(cause: Cause, tries: Array) -> Cause:
-    """Return a cause whose interval holds its own share and nine tries of ten."""
     low, high = np.quantile(tries, _ENDS)
     low, high = min(low, cause.share) - HALF_DIGIT, max(high, cause.share) + HALF_DIGIT
     return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))

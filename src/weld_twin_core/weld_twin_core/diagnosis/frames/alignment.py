@@ -283,7 +283,6 @@ def _turned(track: Track, turn: Array) -> Array:
 
 
 def _based(track: Track, start: Bases, turn: Array, vectors: Array, rounds: int) -> Bases:
-    """Return the base of one recording for given tools."""
     base, reached = start, _reached(track, vectors)
     position = track.position[:, None]
     weight = np.ones(reached.shape[:3])
@@ -380,7 +379,6 @@ class Track:
 
     @property
     def turns(self) -> Array:
-        """Return measured rotations, none where only points were measured."""
         return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
 
 

@@ -3,9 +3,8 @@
 """
 What differs between recordings of one arm: a short list of what may, compared with noise.
 
-The first recording is what the others are compared with. Every error allowed to differ is a
-candidate in each later recording; those worth more than they cost are fitted along with the
-frames, in every hypothesis.
+Every error allowed to differ is a candidate in each recording after the first; those worth more than
+they cost are fitted along with the frames, in every hypothesis.
 """
 
 from __future__ import annotations
@@ -110,7 +109,6 @@ def with_changes(
 
 
 def constant_errors(robot: Robot) -> tuple[Effect, ...]:
-    """Return every constant error of every joint, at zero."""
     kinds = [k for k in REGISTRY.values() if _lasting(k) and k.of in ('joint', 'link')]
     return tuple(kind(joint) for kind in kinds for joint in robot.joint_names)  # type: ignore[call-arg]
 
@@ -258,7 +256,6 @@ def list_changes(
 
 
 def _sure(change: Change, covariance: Array) -> bool:
-    """Return whether a change stands out of the noise."""
     value = change.effect.fit.coordinates()
     chi = float(value @ np.linalg.pinv(covariance, hermitian=True) @ value)
     return chi > SURE**2 * value.size

@@ -3,13 +3,10 @@
 """
 Who else could have done it: for every effect found, the others that would do as well in its place.
 
-Probabilities come from the evidence of fitted alternatives. Effects that move the tool alike on these
-data get equal probability, and are named together.
-
-Excluded effects are still compared: on some motions a hose moves the tool as a load does. Where one of
-them fits as well, no data can vouch for the name alone, and they are a set. Where it fits clearly
-better, what was found stands in for a cause that the library lacks. The same holds for what is no more
-than a constant here, as its joint does not move. None of these counts for more than what was found.
+Excluded effects, and what is no more than a constant as its joint does not move, are compared too.
+Where one fits as well, no data can vouch for the name alone, and they are a set; where it fits clearly
+better, what was found stands in for a cause that the library lacks. None counts for more than what was
+found.
 """
 
 from __future__ import annotations

@@ -109,7 +109,6 @@ class _Shelf:
         return out
 
     def _leave_out(self, family: str, joint: str) -> None:
-        """Tell that a joint, too, hardly moves."""
         still = self._still.setdefault(family, {})
         still[joint] = None
         self.absent[family] = f'{REASON} ({", ".join(still)})'

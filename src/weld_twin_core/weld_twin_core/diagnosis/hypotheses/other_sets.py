@@ -3,11 +3,10 @@
 """
 Other sets of effects that explain the recordings: the search, without what it took in early.
 
-An effect that enters early may stand for several, and then keeps them out: a base that moved for
-a zero and a spring. No exchange of one effect for another leads away from there. So each effect
-found is forbidden in turn, and the set is completed without it, by products of columns alone:
-these are computed once, and a set costs a small system of equations. Waves that came one by one may
-stand for a zero and one wave: each is forbidden by itself, too, and all are chosen anew.
+An effect that enters early may stand for several, and then keeps them out: a base that moved for a
+zero and a spring. So each effect found, and each wave of several, is forbidden in turn, and the set is
+completed without it, by products of columns that are computed once. Waves are chosen anew all
+together, too.
 """
 
 from __future__ import annotations

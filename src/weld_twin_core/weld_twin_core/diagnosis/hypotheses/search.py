@@ -3,9 +3,8 @@
 """
 From recordings to a fitted set of effects: baseline, selection, final fit; what held-out data choose.
 
-A joint that hardly moves shows its zero and its gear ratio alike, and the search takes one of the
-two. Where a held-out motion moves it, they part. Nothing is fitted to the held-out recordings; they
-choose among two or three, and only where these part plainly.
+A joint that hardly moves shows its zero and its gear ratio alike. Where a held-out motion moves it,
+they part: nothing is fitted to it, but it chooses among two or three where these part plainly.
 """
 
 from __future__ import annotations

@@ -22,8 +22,6 @@ SHORTLIST = 4
 
 
 class _Step(NamedTuple):
-    """What a step of a selection comes to."""
-
     fit: Fit  # with the best choice that a machine can have; as it was where there is none
     entered: str | None  # what entered, in words
     impossible: list[Effect]  # better ones that no machine has

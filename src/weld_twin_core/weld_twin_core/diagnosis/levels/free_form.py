@@ -60,15 +60,12 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class FreeForm:
-    """The free-form explanation."""
-
     parts: tuple[Part, ...]  # in the order in which they were found
     gain: float = 0.0  # share of the squared error that they take away on unseen folds, together
     steady: float = 0.0  # the same in standard errors between folds
 
     @property
     def curves(self) -> tuple[Effect, ...]:
-        """Return the curves to fit, their values zero."""
         return tuple(curve for part in self.parts for curve in part.group.movable_curves)
 
     @property
@@ -127,8 +124,6 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Choosing:
-    """What a choice of groups is made on."""
-
     groups: Sequence[Group]
     ways: Sequence[Unseen]
     """What is always fitted, with stretches of time left out in turn, and regions of posture."""
@@ -228,10 +223,10 @@ def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Mem
 
 def worth(work: Choosing, members: list[Member]) -> tuple[tuple[float, ...], float, float]:
     """
-    Return what is lost without each group, what all gain, on unseen folds, and how steadily.
+    Return what each group chosen loses of what all gain on unseen folds, that gain, how steady it is.
 
-    Shares of the squared error, that of all by the way of dividing that shows least, and what each
-    loses of it; and the fall in its standard errors between folds.
+    The gain is a share of the squared error, by the way of dividing that shows least; losses make it
+    up.
     """
     none, now = work.errors([]), work.errors(members)
     gain = max(_worst_gain(none, now), 0.0)

@@ -84,7 +84,6 @@ def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:
 
 
 def _refused(robot: Robot, effect: Effect) -> str:
-    """Return an effect that no machine has, with the values that say so."""
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     values = ', '.join(
         f'{name} {value:.3g} {units[name]} (the limit of machines is {limit:.3g})'

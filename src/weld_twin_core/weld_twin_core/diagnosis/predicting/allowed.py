@@ -149,7 +149,6 @@ def _directions(problem: Problem, model: Model) -> Directions:
 
 
 def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:
-    """Return the posterior with its usual size where it was recorded, and anywhere."""
     seen = np.concatenate(_joints(problem))
     spread = spread_over(len(seen), POSTURES)
     anywhere = postures_within_limits(model.robot, POSTURES)

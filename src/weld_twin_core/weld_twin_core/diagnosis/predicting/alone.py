@@ -3,11 +3,10 @@
 """
 What a robot file can do by itself, without the effects that it cannot hold.
 
-A file of link lengths and zeros holds no springs and no play. The constants of a model with springs
-are right beside the springs; without them the arm of the file hangs otherwise than the real one, and
-may be worse than the nominal arm. So the constants of the file are fitted once more, by themselves,
-and taken where they leave less of what was not fitted. What they were changed by stands beside the
-springs with the other sign: file and effects together are the whole model.
+The constants of a model with springs are right beside the springs; without them the arm of the file
+may be worse than the nominal one. So they are fitted once more, by themselves, and taken where they
+leave less of what was not fitted. What they were changed by stands beside the springs with the other
+sign.
 """
 
 from __future__ import annotations

@@ -3,12 +3,11 @@
 """
 What the model leaves on postures left out of the fit, beyond what open directions account for.
 
-The recordings are cut into regions of posture. Each in turn is predicted by the model fitted on the
-others; what is left over is as large as makes nine of ten of those predictions hold. Of that, what
-the instrument's noise is made of is taken off: noise differs from one sample to the next, what the
-arm does does not. Stations that lie apart do not tell the two from each other. There it counts for
-how much the arm has of all the small errors that could be told, and all of it is the arm's where the
-model is known to lack something.
+Each region of posture is predicted by the model fitted on the others; what is left over is as large as
+makes nine of ten of those predictions hold. The instrument's noise, which differs from one sample to
+the next, is taken off. Stations that lie apart do not tell the two from each other: there it counts
+how much the arm has of all small errors that could be told, or that the model is known to lack
+something.
 """
 
 from __future__ import annotations

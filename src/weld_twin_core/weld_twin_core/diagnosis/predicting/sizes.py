@@ -107,8 +107,6 @@ class Rows:
 
 
 class Weighed(NamedTuple):
-    """All models together."""
-
     mean: Array  # shape (P,)
     covariance: Array  # shape (P, P)
     shown: Array

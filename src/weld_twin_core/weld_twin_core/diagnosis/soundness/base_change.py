@@ -68,7 +68,6 @@ class Rest:
 
     @cached_property
     def share(self) -> float:
-        """Return the share of rows that count as independent."""
         own = [self.residual[self.recording == k][:, :c].ravel() for k, c in enumerate(self.rows)]
         return effective_share(np.concatenate(own), self.rows, self.samples)
 

@@ -3,9 +3,8 @@
 """
 Were poses measured, or computed from the joint positions? Were joint positions read at all?
 
-A controller publishes its own forward kinematics, with the constants of its own model. Some rigid
-arm then agrees with every posture to the last digit. No real arm is so rigid, and no instrument so
-good: gears, bearings and air leave hundredths of a millimetre whatever constants are fitted.
+With the constants of a controller's own model some rigid arm agrees with every posture to the last
+digit. Of a real one gears, bearings and air leave hundredths of a millimetre, whatever is fitted.
 """
 
 from __future__ import annotations

@@ -144,7 +144,6 @@ class Case:
 
     @cached_property
     def changes(self) -> list[Slip | Settling]:
-        """Return what gave way at an instant, and how the base settled."""
         return changes(*self.rest, self.model.robot.joint_names, self.largest)
 
     @cached_property
@@ -159,7 +158,6 @@ class Case:
 
     @cached_property
     def snapshot(self) -> Snapshot:
-        """Return a few samples of every recording as stations, for trials."""
         return snapshot(self.problem, self.model, self.motions)
 
 

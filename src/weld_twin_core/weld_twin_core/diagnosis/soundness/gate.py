@@ -60,8 +60,6 @@ CHECKS: dict[str, tuple[Checker, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """What the gate found."""
-
     given: Given  # as it came, or mended where mistakes were undone
     posed: tuple[Problem, Model] | None
     """To be diagnosed; None where something is wrong that was not undone."""

@@ -26,26 +26,15 @@ from .evidence import Case, Finding, mistake
 from .limits import ENOUGH, FEW, HALVED, ROWS, STRAY, WORTH
 
 IMAGE_FAR = 1.5
-"""
-Noise of a pixel [px] from which images are looked into.
-
-Corners of boards are found within 0.05 to 0.5 px, circles of markers within 1 px.
-"""
+"""Noise of a pixel [px] from which images are looked into. Corners of boards are found within 0.05 to
+0.5 px, circles of markers within 1 px."""
 DOUBT = STRAY / 2.0
-"""
-How far a lens may be from its calibration, in spreads between calibrations of one lens, before it is
-looked into; twice as far it is another one.
-
-Calibrations with few images of a board are off by two or three of them; another lens, or another
-zoom, by ten and more.
-"""
+"""How far a lens may be from its calibration, in spreads between calibrations of one lens, before it is
+looked into; twice as far it is another one. Calibrations with few images of a board are off by two or
+three of them; another lens, or another zoom, by ten and more."""
 TARGET_SCALE = 6e-3
-"""
-Share by which all that cameras measure may be too large for the way of the arm.
-
-Links off by some millimetres in a metre make half of it; a printer that fits the page makes 2 % and
-more.
-"""
+"""Share by which all that cameras measure may be too large for the way of the arm. Links off by some
+millimetres in a metre make half of it; a printer that fits the page makes 2 % and more."""
 CALIBRATE = 'calibrate the camera, at the focus and zoom that it is used with'
 
 

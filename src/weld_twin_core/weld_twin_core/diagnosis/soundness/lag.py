@@ -33,7 +33,6 @@ class Lag(NamedTuple):
     after: float = 0.0
 
     def at(self, t: Array) -> Array:
-        """Return the lag at stamps of the measurements, shape (M,) [s]."""
         return self.late + self.rate * (t - self.middle)
 
 

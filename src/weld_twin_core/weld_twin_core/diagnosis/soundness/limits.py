@@ -3,16 +3,15 @@
 """
 Every number by which the gate decides, with its meaning, its unit and where it comes from.
 
-Two kinds of error are kept apart. What an arm can have (a zero off by tenths of a degree, links
-off by a millimetre, play, springs, lag) is a cause, and a diagnosis looks for it. How large that can
-be is asked of `effects.plausible`. What no arm can have (degrees for radians, two joints swapped,
-another arm) is a mistake in the set-up, and stops the diagnosis. The numbers below lie between the
-two, with room on both sides; the proof ``weld-twin lab gate`` measures that room.
+What an arm can have (a zero off by tenths of a degree, links off by a millimetre, play, springs, lag)
+is a cause; how large that can be says `effects.plausible`. What no arm can have (degrees for radians,
+two joints swapped, another arm) is a mistake in the set-up, and stops the diagnosis. The numbers lie
+between the two, with room on both sides, which the proof ``weld-twin lab gate`` measures.
 
-Many checks share them. A mistake is believed where undoing it makes what is wrong several times
-smaller, and nothing else does as well: `CLEAR`, `HALVED`, `WORTH`. What is left is compared with
-what an arm in use leaves: `NOISE`, `LARGE`, `SOUND`, `UNDONE`, `UNEXPLAINED`, `FAR`. A few samples may
-be anything: `FEW`, `ENOUGH`, `STRAY`.
+A mistake is believed where undoing it makes what is wrong several times smaller, and nothing else does
+as well: `CLEAR`, `HALVED`, `WORTH`. What is left is compared with what an arm in use leaves: `NOISE`,
+`LARGE`, `SOUND`, `UNDONE`, `UNEXPLAINED`, `FAR`. A few samples may be anything: `FEW`, `ENOUGH`,
+`STRAY`.
 """
 
 TINY = 1e-9
@@ -21,20 +20,14 @@ TINY = 1e-9
 # How much better ---------------------------------------------------------------------------------
 
 CLEAR = 5.0
-"""
-Factor by which undoing a mistake must bring down what is wrong.
-
-Undoing a real one brings centimetres to the noise (factors of 100 and more); undoing one that is
-not there by chance never did better than 2 on sound recordings.
-"""
+"""Factor by which undoing a mistake must bring down what is wrong. Undoing a real one brings
+centimetres to the noise (factors of 100 and more); undoing one that is not there by chance never did
+better than 2 on sound recordings."""
 HALVED = 2.0
-"""
-The same where other errors stay: loads and play beside other lengths of links, beside a tool of each
-recording's own, beside even stamps; or where undoing it also brings joints back into their range.
-
-Of sound pairs of recordings tools of their own took off a tenth, of sound arms other lengths a
-quarter; even stamps of a buffered tracker brought 126 mm to 0.3 mm.
-"""
+"""The same where other errors stay: loads and play beside other lengths of links, beside a tool of each
+recording's own, beside even stamps; or where undoing it also brings joints back into their range. Of
+sound pairs of recordings tools of their own took off a tenth, of sound arms other lengths a quarter;
+even stamps of a buffered tracker brought 126 mm to 0.3 mm."""
 WORTH = 0.7
 """A further mistake must bring what is wrong below this share of what it was; another one that leaves
 no more than the best over this share does as well."""
@@ -47,42 +40,29 @@ moving arm twice as much."""
 NOISE = 5e-5
 """Gap [m] that is the noise of a good tracker: below it nothing is looked for in tools and stamps."""
 LARGE = 1e-3
-"""
-Median gap [m] that frames and a plausible arm leave, from which mistakes are looked for.
-
-Play, ripple, lag and springs of an arm in use leave tenths of a millimetre; the smallest mistakes
-(a sibling arm, a sign on a joint that moves by one degree) leave some millimetres.
-"""
+"""Median gap [m] that frames and a plausible arm leave, from which mistakes are looked for. Play,
+ripple, lag and springs of an arm in use leave tenths of a millimetre; the smallest mistakes (a sibling
+arm, a sign on a joint that moves by one degree) leave some millimetres."""
 SOUND = 2.0 * LARGE
 """Gap [m] that a sound arm leaves by itself, moving or at rest: play, ripple, lag and springs."""
 UNDONE = 2.0 * SOUND
-"""
-Median gap [m] that a plausible arm may leave once a mistake is undone, and motion of the tool by wrong
-lengths from which they are those of another arm.
-
-Of rows that do not belong together any turn of a joint may by chance leave a fifth, and still
-centimetres. The two arms of docs/real_arms.md are off by 2 to 3 mm in all, most of it by their
-zeros; arms of one family differ by 5 to 30 mm.
-"""
+"""Median gap [m] that a plausible arm may leave once a mistake is undone, and motion of the tool by
+wrong lengths from which they are those of another arm. Of rows that do not belong together any turn of
+a joint may by chance leave a fifth, and still centimetres. The two arms of docs/real_arms.md are off by
+2 to 3 mm in all, most of it by their zeros; arms of one family differ by 5 to 30 mm."""
 UNEXPLAINED = 0.01
 """Median gap [m] that frames and a plausible arm leave, from which nobody can use the data."""
 FAR = 0.05
-"""
-Median gap [m] from which given frames are looked at: below, they are plausible in any case.
-
-Whether they are a cause then is for `effects.plausible`, `base_pose` and `tool_pose`, to say. A tool
-that never moves is held where the gap is less than this for each radian or metre of a joint: alone
-it would move the tool by a lever of half a metre.
-"""
+"""Median gap [m] from which given frames are looked at: below, they are plausible in any case. Whether
+they are a cause then is for `effects.plausible`, `base_pose` and `tool_pose`, to say. A tool that never
+moves is held where the gap is less than this for each radian or metre of a joint: alone it would move
+the tool by a lever of half a metre."""
 WIDER = 3.0
 """An arm is plausible in a trial with errors this many times as large as those of machines at large."""
 COMPUTED = 2e-6
-"""
-Gap [m] that a rigid arm leaves of computed poses at most: a fifth of what the best tracker repeats.
-
-Numbers of 32 bits leave 1e-7. Of the real arms under a tracker a rigid arm left 50e-6 and more.
-Where numbers were rounded it may be as much as `CLEAR` times this, if rounding explains it.
-"""
+"""Gap [m] that a rigid arm leaves of computed poses at most: a fifth of what the best tracker repeats.
+Numbers of 32 bits leave 1e-7. Of the real arms under a tracker a rigid arm left 50e-6 and more. Where
+numbers were rounded it may be as much as `CLEAR` times this, if rounding explains it."""
 
 # Angles ------------------------------------------------------------------------------------------
 
@@ -114,12 +94,9 @@ MOVED = 0.02
 # Clocks ------------------------------------------------------------------------------------------
 
 LATE = 0.2
-"""
-Lag [s] from which stamps are of another clock.
-
-Streams through one computer are tens of milliseconds apart, drives lag by as much (the servo axis
-of EMPS: 6.5 ms), an arm settles within it; clocks that nobody synchronised are off by anything.
-"""
+"""Lag [s] from which stamps are of another clock. Streams through one computer are tens of milliseconds
+apart, drives lag by as much (the servo axis of EMPS: 6.5 ms), an arm settles within it; clocks that
+nobody synchronised are off by anything."""
 
 # How long it is looked ---------------------------------------------------------------------------
 

@@ -3,9 +3,8 @@
 """
 Corrections of what was given: each takes recordings, robot and frames, and returns them.
 
-A correction is kept as a function of this file with its values (`functools.partial`). So it can stand
-in diagnosis.json (`as_entry`) and be made again wherever the model of that diagnosis is used on the
-same source (`replayed`).
+Kept as a `functools.partial` of a function of this file, one can stand in diagnosis.json (`as_entry`)
+and be made again on the same source (`replayed`).
 """
 
 from __future__ import annotations
@@ -31,8 +30,6 @@ Sampled = TypeVar('Sampled', Signal, JointSignal)
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What a diagnosis is given."""
-
     recordings: tuple[Recording, ...]
     robot: Robot
     align: frozenset[str] = frozenset()  # frames to be fitted: 'base', 'tool'

@@ -3,9 +3,8 @@
 """
 Did something give way at an instant: instrument or base, the tool, one joint? Did the base settle?
 
-Residuals of the aligned model, with everything projected out that frames and a plausible arm can
-explain to first order (`base_change`), are searched for a step of each of them. A step is dated
-only where it explains much more than any smooth change of the same thing or of another.
+What frames and a plausible arm leave to first order (`base_change`) is searched for a step of each. It
+is dated only where it explains much more than any smooth change of the same thing or of another.
 """
 
 from __future__ import annotations

@@ -200,7 +200,6 @@ class Arm(NamedTuple):
 
     @property
     def off(self) -> float:
-        """Return how much is wrong in all."""
         return max(self.bent, self.displaced)
 
 

@@ -38,7 +38,6 @@ def streams(given: Given) -> list[Finding]:
 
 
 def velocities_checked(recording: Recording) -> Recording:
-    """Return the recording without velocities that cannot be."""
     if not _still(recording).any():
         return recording
     return replace(recording, joints=replace(recording.joints, qd=None))
@@ -133,7 +132,6 @@ def _evenly(given: Given, k: int, result: Bursts) -> tuple[float, Bursts, float]
 
 
 def _stamped(even: Bursts, k: int, count: int) -> Mend:
-    """Return what stamps recording k by an even clock."""
     first, step, lost = even.first, even.step, even.lost
     return partial(stamped_evenly, k=k, first=first, step=step, lost=lost, count=count)
 

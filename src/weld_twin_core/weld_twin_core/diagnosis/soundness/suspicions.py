@@ -67,7 +67,6 @@ def doubles(robot: Robot) -> Iterator[Finding]:
 
 
 def robots(robot: Robot) -> Iterator[Finding]:
-    """Yield every other bundled robot of as many joints."""
     for name in catalog.names():
         if catalog.load(name).n == robot.n and name != robot.name:
             yield mistake(
@@ -198,7 +197,6 @@ def _positions() -> Iterator[tuple[str, str, str, Array]]:
 
 
 def _with(values: Array, at: int | list[int] | tuple[int, int], value: float) -> Array:
-    """Return an array with another value at a place or some."""
     out = np.array(values)
     out[at] = value
     return out

@@ -3,10 +3,9 @@
 """
 Contacts that are not what they are called: another socket, a slip, a place that was moved.
 
-An arm as wrong as machines are is fitted first, all its constant errors and springs together; what
-is far off then is no error of the arm. Such postures are reported and not fitted as what they were
-called: those of another socket are counted there, a place that moved counts as two, a slip is left
-out. Where known lengths cannot be, nothing is mended: files were mixed up.
+What is far off once an arm as wrong as machines are is fitted is no error of the arm. Postures of
+another socket are counted there, a place that moved counts as two, a slip is left out. Where known
+lengths cannot be, files were mixed up, and nothing is mended.
 """
 
 from __future__ import annotations

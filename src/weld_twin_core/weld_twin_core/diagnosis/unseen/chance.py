@@ -38,8 +38,6 @@ SEED = 3
 
 
 class Candidates(NamedTuple):
-    """What could have been found."""
-
     fixed: Array  # whitened columns that are always fitted, shape (P, rows)
     precision: Array  # their prior precision, shape (P,)
     groups: Iterable[Array]  # one group is found at a time, shape (E, rows)

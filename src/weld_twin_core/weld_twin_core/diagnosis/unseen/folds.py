@@ -3,9 +3,8 @@
 """
 Parts of the data that take turns in being unseen, and what a model gains on them.
 
-Parts are stretches of time, as `Problem.block_labels` cuts them, and regions of posture: what carries
-over to the next minute need not carry over to where the arm has not been. Neighbouring samples err
-alike, so that it is parts that are counted wherever an error is reported.
+Parts are stretches of time (`Problem.block_labels`) and regions of posture: neighbouring samples err
+alike, and what carries over to the next minute need not carry over to where the arm has not been.
 """
 
 from __future__ import annotations

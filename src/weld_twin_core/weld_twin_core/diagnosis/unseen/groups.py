@@ -3,15 +3,13 @@
 """
 Every place that could be at fault, and everything the fault could depend on, without a formula.
 
-A group is a place and a dependence, spanned by curves (`JointCurve`, `FrameCurve`) or, where no
-curve can be carried over to another motion, by plain columns. Groups compete as wholes.
+A group is a place and a dependence, spanned by curves (`JointCurve`, `FrameCurve`) or, where no curve
+can be carried over to another motion, by plain columns. Groups compete as wholes.
 
-Some places no single joint shows: the instrument, all links alike, a weight at the tool. A wrong unit
-of length looks like small constants of several joints, a weight like several springs, links that warm
-up like several lengths. One group for each lets the simplest explanation win. Beside them stands lost
-motion of every joint without a formula: free in the gaps it trails in, and in angle, speed and load by
-the way it goes. Few of these can be carried to another motion as a curve; they say where, and on what
-it depends.
+Some places no single joint shows: a wrong unit of length looks like small constants of several joints,
+a weight like several springs, links that warm up like several lengths. One group for each lets the
+simplest explanation win. Beside them stands lost motion of every joint, free in its gaps, angle, speed
+and load.
 """
 
 from __future__ import annotations

@@ -3,17 +3,15 @@
 """
 What models with more or fewer effects predict on stretches they were not fitted on.
 
-Stretches are those of time, or regions of posture: what carries over to the next minute need not
-carry over to where the arm has not been.
-
 The found effects are small, so around the final fit every smaller model is linear: the exact
-contribution of each effect is put back into the residual where it is left out, and the coordinates
-of those kept are fitted anew on the other stretches. What has no coordinates, but is chosen by a
-search, is chosen anew there, too: of thousands of staircases one fits anything it is chosen by.
-Normal equations of every stretch are formed once; a model is a choice of columns and targets. Where
-a seam or a SCARA hardly tells base from tool, fitted frames can be a metre off, and a metre times
-the turn of an effect that is left out would take that effect's place. So the columns of the frames
-are those of the arm without the effects.
+contribution of each effect is put back into the residual where it is left out, and the coordinates of
+those kept are fitted anew on the other stretches. What a search alone chooses is chosen anew there,
+too: of thousands of staircases one fits anything it is chosen by. Normal equations of every stretch
+are formed once; a model is a choice of columns and targets.
+
+Where a seam or a SCARA hardly tells base from tool, fitted frames can be a metre off, and a metre
+times the turn of an effect that is left out would take its place. So frames have the columns of the
+bare arm.
 """
 
 from __future__ import annotations
@@ -365,7 +363,6 @@ class Unseen:
         return np.concatenate(self._trusted(out)) / np.concatenate(weights)
 
     def rms(self, residual: Array) -> float:
-        """Return the RMS position error over trusted samples, [m]."""
         return float(np.sqrt(self.squares(residual).mean()))
 
     def turn_rms(self, residual: Array) -> float | None:

@@ -3,9 +3,8 @@
 """
 Where the gap lies, what it depends on, and whether something is left that no named effect explains.
 
-All groups of columns without a formula are tried without the effects. Only a few are tried beside the
-model: of many, one fits noise by chance. If one predicts unseen folds better beside the
-model, the residual has structure, and the groups that bring it say what it depends on.
+All groups without a formula are tried without the effects; beside the model only a few, as of many one
+fits noise by chance. Those that predict unseen folds better say what the residual depends on.
 """
 
 from __future__ import annotations

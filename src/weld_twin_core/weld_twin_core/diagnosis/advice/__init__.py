@@ -16,12 +16,7 @@ __all__ = ['Limits', 'actions', 'next_experiment']
 def actions(
     result: Sequence[Effect], robot: Robot, turned: Collection[str | None] = ()
 ) -> tuple[str, ...]:
-    """
-    Return what to do about every effect found, one sentence each, in their order.
-
-    By the nominal model, which is entered in the controller now. Of joints that were recorded with
-    the other sign, ``turned``, it is said how to read that.
-    """
+    """Return what to do about every effect by the nominal model, and how to read a ``turned`` joint."""
     counted = [each.traits.set_at_controller and each.site in turned for each in result]
     return tuple(
         f'{each.remedy(robot)} {TURNED_ROUND}' if other else each.remedy(robot)

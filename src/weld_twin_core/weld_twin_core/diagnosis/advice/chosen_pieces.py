@@ -140,12 +140,7 @@ def planned(
     now: Side,
     named: int = 1,
 ) -> Plan | None:
-    """
-    Return the best pieces of a measurement; None where none of them fits into the minutes.
-
-    The first arguments are those of `separation.partings`; ``now`` is what the alternatives say of
-    the data at hand, and the first ``named`` alternatives are named by the verdict.
-    """
+    """Return the best pieces of a measurement; None where none of them fits into the minutes."""
     room = 60.0 * min(limits.minutes - option.set_up, limits.moving)
     plan = Plan(option, (), named=named)
     if (option.whole and sum(p.seconds for p in option.pieces) > room) or not plan.open(room):

@@ -204,12 +204,7 @@ def _root(information: Array) -> Array:
 
 
 def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
-    """
-    Yield further touches of every place that can be reached: its number, and a recording.
-
-    The joints stay within the recorded range, a little widened, and the tool leans no further than
-    it has leaned there: what holds the artefact is not known.
-    """
+    """Yield each place's number, and touches within its joints, widened, and its lean of the tool."""
     for k, recording in enumerate(problem.recordings):
         contacts, measured = recording.touched, recording.seen
         rows = np.arange(_TRIED) % contacts.size
@@ -287,19 +282,12 @@ def next_touches(
     """
     Return the touches to make next, as plain numbers and strings; None where none can be reached.
 
-    problem: of contacts.
-    model: as found, with its frames.
     alternatives: explanations that fit alike; with fewer than two, whatever narrows the arm's
     errors most is proposed.
-    scale: the noise of a touch.
 
-    Returns
-    -------
-    dict or None
-        As `next_experiment` returns it, of kind 'touches'; 'motion' has 'contact', what each
-        posture touches, and 'needed' says how many touches reach nine tenths of what more touches
-        can narrow (None where forty do not).
-
+    As `next_experiment` returns it, of kind 'touches'; 'motion' has 'contact', what each posture
+    touches, and 'needed' says how many touches reach nine tenths of what more touches can narrow
+    (None where forty do not).
     """
     effects, disputed = _unknowns(problem, model, alternatives)
     design = Design.of(problem, model, effects, scale)

@@ -50,11 +50,7 @@ def inverse_of(root: Array) -> Array:
 
 
 def root_of(matrix: Array, *, clean: bool = True) -> Array:
-    """
-    Return the lower triangle L of a matrix L L' in C order, in its place, empty above if ``clean``.
-
-    Raises LinAlgError: the matrix is not positive definite.
-    """
+    """Return L of a matrix L L' in C order, in its place; LinAlgError if it is not definite."""
     # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
     factor, failed = dpotrf(matrix.T, lower=1, clean=clean, overwrite_a=1)
     if failed:
@@ -63,11 +59,7 @@ def root_of(matrix: Array, *, clean: bool = True) -> Array:
 
 
 def factored(matrix: Array) -> Callable[[Array], Array]:
-    """
-    Return what solves for right-hand sides, (P,) or (P, R), by the factor in place of the matrix.
-
-    Raises LinAlgError: the matrix, in C order, is not positive definite.
-    """
+    """Return what solves for (P,) or (P, R) by a matrix, overwritten; LinAlgError if not definite."""
     if not matrix.size:
         return np.array
     factor = root_of(matrix, clean=False)
@@ -88,11 +80,7 @@ def well_conditioned(matrix: Array, least: float) -> bool:
 
 
 def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """
-    Return the solution and the diagonal of the inverse, (P,) each; overwrites the matrix, in C order.
-
-    Raises LinAlgError: the matrix is not positive definite.
-    """
+    """Return solution and diagonal of the inverse, (P,); overwrites as `root_of` does."""
     factor = root_of(matrix)
     solution, _ = dpotrs(factor, right, lower=1)
     upper = dtrtri(factor, lower=1, overwrite_c=1)[0].T  # rows that lie together

@@ -127,11 +127,7 @@ def same_error(
     *,
     both: bool = False,
 ) -> bool:
-    """
-    Return whether one of two constant errors can always do what the other does, or each (``both``).
-
-    What frames that are fitted take up distinguishes nobody; values do not count.
-    """
+    """Return whether one of two constant errors, or each, can always do the other, frames aside."""
     a, b = columns(robot, one), columns(robot, other)
     if align:
         span = _frames(robot, align)

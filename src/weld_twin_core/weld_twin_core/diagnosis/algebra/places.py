@@ -42,11 +42,7 @@ def posed(
     model: Model,
     align: frozenset[str],
 ) -> Problem:
-    """
-    Return the problem of what an instrument measured and of places touched, as of `by_place`.
-
-    The model has a base for each of both; none is fitted where nothing shows it.
-    """
+    """Return the problem of what was measured and of places touched (`by_place`), at a model."""
     filled = [_filled(part, model, k) for k, part in enumerate(touched, len(tracked))]
     anchor = Anchor(model.bases, model.robot.T_flange_tool)
     problem = Problem((*tracked, *filled), align, anchor, given=model.given).touching(model)

@@ -37,11 +37,7 @@ of the other what only both together show."""
 
 
 def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[str]:
-    """
-    Return the frames to fit along: 'base', 'tool', 'base,tool', or some names; ``what`` names them.
-
-    Raises ModelError: a name is neither 'base' nor 'tool'.
-    """
+    """Return the frames to fit along, of a text or names; ModelError says ``what`` is wrong."""
     parts = align.split(',') if isinstance(align, str) else align
     frames = frozenset(name for part in parts if (name := str(part).strip()))
     for frame in sorted(frames - set(FRAMES)):
@@ -220,12 +216,7 @@ class Problem:
         return sum(c * m for c, m in zip(self.rows, self.samples, strict=True))
 
     def residuals(self, model: Model) -> list[Array]:
-        """
-        Return measured minus twin, one array (c, M) per recording [m, rad].
-
-        Of contacts it is the way from the tool point to where the contact is, as this model and
-        the lengths known put it.
-        """
+        """Return measured minus twin, (c, M) per recording [m, rad]; of contacts the way to them."""
         out = []
         for maker, recording in zip(self.features(model), self.recordings, strict=True):
             measured, poses = recording.seen, maker.run.poses
@@ -287,12 +278,7 @@ class Problem:
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
 
     def in_noise(self, k: int, part: Array, scale: Scale) -> Array:
-        """
-        Return a residual-like part (..., c, M) of recording k in units of noise, (..., M, c).
-
-        Poses whose instrument tells how sure they are have rows mixed until each is as sure as usual
-        ones.
-        """
+        """Return a part (..., c, M) of recording k in noise, rows equally sure, (..., M, c)."""
         unit = np.full(part.shape[-2], 1.0 / scale.position)
         unit[3:] = 1.0 / scale.orientation
         turned = np.swapaxes(part, -1, -2)
@@ -432,12 +418,7 @@ def usable(recording: Recording) -> Recording:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """
-    Noise that residuals are measured in: position [m], orientation [rad], weight per sample.
-
-    ``weights`` holds one array (M,) per recording, 1 for a good sample, less for an outlier, 0 for one
-    that is left out.
-    """
+    """Noise of position [m] and orientation [rad]; weights (M,) by recording: 1 is good, 0 left out."""
 
     position: float
     orientation: float
@@ -538,11 +519,7 @@ class Model:
         return self.common[k] if self.common else np.zeros(count)
 
     def reading_map(self) -> tuple[Array, Array]:
-        """
-        Return what undoing mistakes made of joint positions as they were recorded.
-
-        Mended positions are q matrix' + offset, (n, n) and (n,) [rad or m].
-        """
+        """Return (n, n) and (n,) [rad or m]: undoing mistakes made positions q matrix' + offset."""
         matrix, offset = np.eye(self.robot.n), np.zeros(self.robot.n)
         for entry in self.mends:
             if entry.get('do') == 'joints':

@@ -73,11 +73,7 @@ def _square(row: Array) -> float:
 
 
 def profile(problem: Problem, model: Model, scale: Scale, k: int) -> Tried | None:
-    """
-    Return instances in the place of found effect k, and how many squares each fits worse, (D,).
-
-    None where the effect's kind has no need of a search.
-    """
+    """Return instances in place of found effect k, if searched, and how many squares each fits worse."""
     effect = model.found[k]
     if not effect.fit.searched:
         return None

@@ -100,9 +100,8 @@ class SeedSystems:
         """
         Return the systems for a residual, with the columns of a model projected out.
 
-        normal: products of the model's columns, shape (P, P).
-        pull: their products with the residual, shape (P,).
-        rss: sum of squares of the residual.
+        normal, pull, rss: products of the model's columns, (P, P), with the residual, (P,), and of
+        that.
         products: of all columns with the model's, and with the residual, shape (all columns, P + 1).
         """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
@@ -287,11 +286,7 @@ class Library:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """
-    What selection works on: the problem, its noise, the shared library, and beliefs.
-
-    The library's own products are computed once; residuals change, columns do not.
-    """
+    """What selection works on; products of the library are computed once, as only residuals change."""
 
     problem: Problem
     scale: Scale

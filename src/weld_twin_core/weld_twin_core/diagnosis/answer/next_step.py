@@ -57,11 +57,7 @@ def next_step(
     limits: Limits,
     alternative: Curved | None,
 ) -> dict[str, Any] | None:
-    """
-    Return the next experiment as `next_experiment` does, None when the question is closed.
-
-    The verdict has the confidence it has earned; ``alternative`` explains the gap without a formula.
-    """
+    """Return the next experiment as `next_experiment` does, None when the question is closed."""
     if result.problem.untracked:
         return _touches(result, verdict)
     wanted = _parting(result, verdict, limits, alternative)

@@ -70,11 +70,7 @@ def aligned(
 
 
 def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Model:
-    """
-    Return the robot with the frames in ``align`` that best agree with a recording.
-
-    Raises DataError: nothing was measured, or the clocks of joints and measurements do not meet.
-    """
+    """Return the robot with frames that best agree with a recording; DataError if it has none."""
     problem = Problem((usable(recording),), align)
     start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
     return fit(problem, start, problem.unit_scale()).model
@@ -114,12 +110,7 @@ def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
 
 
 def other_causes(problem: Problem) -> tuple[str, ...]:
-    """
-    Return the kinds of effect that no contact tells of; none where an instrument measured.
-
-    A place may be anywhere unless it is known, so nothing that moves all of the cell shows; a
-    contact has no approach and no time that counts; there is no instrument.
-    """
+    """Return the kinds of effect that no contact tells of; none where an instrument measured."""
     if not problem.untracked:
         return ()
     return tuple(

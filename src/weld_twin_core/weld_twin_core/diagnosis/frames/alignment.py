@@ -345,12 +345,7 @@ def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """
-    One recording for alignment, or the same recording in several trials, their axis in front.
-
-    ``position`` (M, 3) and ``rotation`` (M, 3, 3) or None were measured, ``point`` and ``turn``
-    are those of the flange in the base frame.
-    """
+    """One recording: measured position and rotation, the flange's point and turn; or some trials."""
 
     position: Array
     rotation: Array | None

@@ -52,11 +52,7 @@ UNTOLD = 0.9
 
 
 def families_named(given: str | Iterable[str], what: str = 'may_change') -> tuple[str, ...]:
-    """
-    Return the families that may differ between recordings; ``what`` names them in a message.
-
-    Raises ModelError: a name is no effect, or one that is not constant.
-    """
+    """Return the families that may differ between recordings; ModelError says ``what`` has others."""
     parts = given.split(',') if isinstance(given, str) else given
     names = tuple(dict.fromkeys(name for part in parts if (name := str(part).strip())))
     lasting = sorted(name for name, kind in REGISTRY.items() if _lasting(kind))
@@ -232,11 +228,7 @@ def _site(change: Change) -> tuple[int, str, str | None]:
 def list_changes(
     problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
 ) -> tuple[Changed, ...]:
-    """
-    Return what differs between recordings beyond noise by a fitted model, by recording.
-
-    families: what may differ. Frames that were fitted for each recording are compared here.
-    """
+    """Return what differs between recordings beyond noise; frames fitted for each are compared here."""
     columns, ridge = _columns(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)

@@ -33,11 +33,7 @@ SHORTLIST, BESIDE = 7, 3
 def fit_alternatives(
     work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()
 ) -> CandidateSet:
-    """
-    Return found effect k of a final fit and those that could take its place, most probable first.
-
-    others: sets that do without something found: what takes its place may need company.
-    """
+    """Return found effect k and what could take its place, in company (``others``), likeliest first."""
     place = Site.of(now.model.found[k])
     rest = work.without(now, k)
     ranked = work.ranked(rest, work.effective(now), roles=Role)

@@ -30,12 +30,7 @@ one does, as all stand still."""
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
-    """
-    Return the library at a model: one set of columns that all hypotheses share.
-
-    Families that are excluded are in it too, and so is what no search can find: they are held
-    against what is found, in its place.
-    """
+    """Return the library at a model; what is excluded, or not to be found, is in it to be compared."""
     shelf = _Shelf(problem, model, scale, exclude)
     for kind in candidate_kinds(problem.align):
         for joint in joints_of(kind, model.robot):

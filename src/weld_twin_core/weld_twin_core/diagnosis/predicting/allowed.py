@@ -117,12 +117,7 @@ def allowed(
 
 
 def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
-    """
-    Return the shrink with what may be left of the gap where nothing was recorded.
-
-    Regions of one motion that foretell each other say little of others: beyond what they show the
-    model may be off by as much as the posterior has it there.
-    """
+    """Return the shrink with what may be left where nothing was recorded, as the posterior has it."""
     if shrink.elsewhere_ci95 is None or shrink.rms_before_m == 0.0:
         return shrink
     most = float(np.hypot(shrink.rms_after_m, posterior.anywhere_m)) / shrink.rms_before_m
@@ -160,23 +155,14 @@ def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> P
 
 
 def corrected_sigma(posterior: Posterior, model: Model, q: Array) -> float:
-    """
-    Return how far a robot corrected by a model may be off at postures at rest, (M, n) [m].
-
-    What a diagnosis warns of and what `planned` promises; effects in the middle of those allowed.
-    """
+    """Return how far a robot corrected by the middle of the models may be off at rest, (M, n) [m]."""
     effects, known = posterior.centred(model.found)
     twin = Twin(model.twin(0).robot, of_the_robot((*model.known, *effects)))
     return usual_sigma(known, twin, q)
 
 
 def _expected(problem: Problem, scale: Scale) -> float:
-    """
-    Return the variance of a whitened row before the fit is looked at.
-
-    A fit of few stations leaves less than the noise; one of a stream has a hundred rows for every
-    coordinate and leaves what there is.
-    """
+    """Return the variance of a whitened row beforehand: a fit of few stations leaves less than noise."""
     if not problem.at_rest:
         return 1.0
     return float((LEAST_NOISE / scale.position) ** 2)
@@ -300,12 +286,7 @@ class Conditioning:
 
 
 def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
-    """
-    Return the directions of aligned frames in which an error does not show, in words.
-
-    A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
-    along z by which no measured pose changes. Places touched and not known tell nothing of the base.
-    """
+    """Return directions of aligned frames in which an error does not show, by their main axes."""
     unseen = problem.untracked and not problem.placed
     result = open_directions(problem, model)
     out = [f'base {axis}' for axis in AXES] if unseen else []

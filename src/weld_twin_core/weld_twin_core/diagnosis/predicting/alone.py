@@ -96,12 +96,7 @@ def _constants(model: Model) -> Model:
 
 
 def _framed(constants: Model) -> Model:
-    """
-    Return the model with nothing to be fitted but aligned frames.
-
-    Frames fitted beside a spring or a ratio are not where they are without it. What they take up by
-    themselves is no zero's: zeros that a small motion cannot tell from frames do harm elsewhere.
-    """
+    """Return the model with nothing to be fitted but aligned frames: a spring moves them elsewhere."""
     return replace(constants, known=constants.found, found=())
 
 

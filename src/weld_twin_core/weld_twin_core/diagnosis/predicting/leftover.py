@@ -142,11 +142,7 @@ class Predicted:
         )
 
     def axes(self, part: slice, swings: float) -> tuple[Array, Array, Array]:
-        """
-        Return errors (K, c), moments (K, c, c) and levers (K, c, n) of samples that have rows.
-
-        swings: as a discrepancy has it; what swings is accounted for.
-        """
+        """Return errors (K, c), moments (K, c, c) and levers (K, c, n), swings accounted for."""
         some = self.good & self.seen[:, part].all(axis=1)
         left, levers = self.left[some, part], self.levers[:, some, part]
         moved = levers.transpose(1, 2, 0) * (swings * self.shaken[some])[:, None]

@@ -105,12 +105,7 @@ def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
 
 
 def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
-    """
-    Return the family number of every coordinate, (K,), and which families are a gear's.
-
-    A family is an effect on all joints; but every gear is as uneven as it was cut, and says
-    nothing of the others.
-    """
+    """Return the family of every coordinate, (K,), and which are a gear's, each one by itself."""
     names = [(e.name, None if e.traits.waves is None else e.site) for e in effects]
     gears = {name: e.traits.waves is not None for name, e in zip(names, effects, strict=True)}
     distinct = list(gears)

@@ -54,11 +54,7 @@ class _Loads:
 
 
 def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording, ...]:
-    """
-    Return recordings whose efforts are known to hold the load, or to be it.
-
-    Raises DataError: some have efforts and others none, none ever changes, or they are not in N m.
-    """
+    """Return recordings whose efforts hold the load, or are it; DataError for others or some."""
     reported = [recording.effort is not None for recording in recordings]
     if not any(reported):
         return tuple(recordings)

@@ -108,11 +108,7 @@ def _shares(
     ridges: Sequence[float],
     steady: float,
 ) -> Array:
-    """
-    Return the share of every target that a group predicts at every ridge, shape (R, K), if steady.
-
-    Columns beside a fit that is there already change it by no more than their number of directions.
-    """
+    """Return the steady share of every target that a group predicts at every ridge, shape (R, K)."""
     beside = group @ rest
     normal, pull = beside @ group.T, group @ remaining
     held = np.array(ridges)[:, None, None] * np.eye(len(group))

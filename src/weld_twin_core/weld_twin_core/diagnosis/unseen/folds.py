@@ -85,11 +85,7 @@ class Gain(NamedTuple):
 
 
 def gain(before: Array, after: Array, labels: Array, after_labels: Array | None = None) -> Gain:
-    """
-    Return what is gained from squared errors to others, (samples,) [m^2], by parts of samples.
-
-    after_labels: parts of those after, where other samples are trusted.
-    """
+    """Return what is gained by squared errors (samples,) [m^2], in parts that both have."""
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
     one, two = means(before, labels)[names], means(after, others)[names]
@@ -112,11 +108,7 @@ def steadiness(before: Array, after: Array) -> float:
 
 
 def parts_of(labels: Sequence[Array]) -> NDArray[np.intp]:
-    """
-    Return the part of every sample, those of all ways to divide one after the other.
-
-    Of eight parts two neighbours together tell more steadily.
-    """
+    """Return the part of every sample, way after way; two neighbours of eight are one, and steadier."""
     parts, first = [], 0
     for each in labels:
         names, own = np.unique(each, return_inverse=True)
@@ -126,12 +118,7 @@ def parts_of(labels: Sequence[Array]) -> NDArray[np.intp]:
 
 
 def growth(before: Array, after: Array, parts: NDArray[np.intp]) -> Array:
-    """
-    Return by what share the RMS error of every part grows, chance aside, shape (parts,).
-
-    before, after: squared errors, shape (samples,) [m^2].
-    parts: of every sample, shape (samples,).
-    """
+    """Return by what share the RMS of every part grows, chance aside, by squares (samples,) [m^2]."""
     was, now, mean = (means(values, parts) for values in (before, after, after - before))
     out = np.sqrt(now) / np.maximum(np.sqrt(was), NANOMETRE) - 1.0
     spread = means((after - before - mean[parts]) ** 2, parts)

@@ -108,11 +108,7 @@ class Unseen:
         return self._others[key]
 
     def along(self, columns: Array) -> Unseen:
-        """
-        Return the same with something fitted along that was found at zero.
-
-        columns: whitened, each as large as it is believed to be, shape (E, rows).
-        """
+        """Return the same with something fitted along at zero, as large as believed, (E, rows)."""
         count, more = self.columns.count, len(columns)
 
         def taken() -> Array:
@@ -327,11 +323,7 @@ class Unseen:
         return out
 
     def missed(self) -> Array:
-        """
-        Return by what share the error of every part grows without each effect, shape (K, parts).
-
-        Parts of every way to divide the data, all other effects and the frames fitted anew.
-        """
+        """Return by what share errors grow without each effect, (K, parts of all ways to divide)."""
         ways, every = self.every_way(), range(len(self.parts))
         parts = parts_of([each.trusted_labels() for each in ways])
 

@@ -117,6 +117,14 @@ def test_a_program_that_was_cut_off_is_refused(language, tmp_path):
     assert said.code == 2 and 'is the file cut off?' in said.err
 
 
+def test_points_in_two_files_of_one_name_are_refused(tmp_path):
+    for name, copy in (('.src', '.src'), ('.dat', '.dat'), ('.dat', '.DAT')):
+        (tmp_path / f'bracket{copy}').write_bytes((MADE / f'bracket{name}').read_bytes())
+    words = ('correct', tmp_path / 'bracket.src', '--robot', 'kuka_kr16_2')
+    said = weld_twin(*words, '--out', tmp_path / 'out')
+    assert said.code == 2 and "bracket.DAT' and 'bracket.dat' both belong" in said.err
+
+
 def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
     said = weld_twin(
         *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),

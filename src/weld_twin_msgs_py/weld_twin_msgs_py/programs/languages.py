@@ -138,7 +138,12 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
             for other in sorted(place.parent.glob('*'))
             if other.stem.lower() == place.stem.lower() and other.suffix.lower() == extension
         ]
-        beside += [read_source(other) for other in result[:1]]
+        if len(result) > 1:
+            raise DataError(
+                f"'{result[0]}' and '{result[1].name}' both belong to {source.name}: nobody knows which "
+                'of them the controller has; move one away'
+            )
+        beside += [read_source(other) for other in result]
     return read_sources([source, *beside], context, name)
 
 

@@ -266,6 +266,12 @@ def test_two_tools_that_the_program_only_names_are_not_both_that_of_the_robot_fi
         assert said_of in said.out + said.err
 
 
+def test_that_the_program_sets_no_tool_and_which_was_taken_is_said(tmp_path):
+    for head, said_of in (('', True), ('  set_tcp(p[0, 0, 0.25, 0, 0, 0])\n', False)):
+        said = corrected(tmp_path, SEAM.replace(':\n', f':\n{head}', 1), '--force')
+        assert said.code == 0 and ('the program sets no tool' in said.out) == said_of
+
+
 def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):
     said = corrected(tmp_path, SEAM, '--max-correction', '0.2mm', '1deg', offset=5e-4)
     assert said.code == 0, said.err

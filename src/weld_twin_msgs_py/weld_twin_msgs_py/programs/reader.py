@@ -171,6 +171,11 @@ class Reader(ABC):
         if len(values) > 1:
             return
         only = own[0] if own else Frame('')
+        if not own and self.program.steps:
+            self.program.notes.append(
+                f'the program sets no {name}, and that of the robot file was taken; where the controller '
+                'has another, set it in the program'
+            )
         for piece in self.program.pieces:
             exchange(piece, name, inherited, only)
 

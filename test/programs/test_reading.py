@@ -232,6 +232,9 @@ IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
         ('fanuc-ls', '   5:  UTOOL[R[2]]=PR[3] ;\n', 'UTOOL 1 are set'),
         ('fanuc-ls', '   5:  Touch Offset PR[1] ;\n', 'Touch Offset'),
         ('inform', 'SETTOOL TL#(1) P001\n', 'TL 1 are set'),
+        ('krl', f'DECL FRAME F={FRAME}\nmeasured(F)\n$BASE = F\n', 'set anew'),
+        ('rapid', 'Measured wobjTable;\n', 'set anew'),
+        ('rapid', 'GetSysData tTorch;\n', 'set anew'),
         ('krl', '$WORLD.Z = 100\n', 'what bases count from'),
         ('krl', f'$ROBROOT={FRAME}\n', 'what bases count from'),
     ],
@@ -254,6 +257,14 @@ def test_a_program_that_goes_along_with_a_conveyor_is_left():
         head = f'/APPL\nLINE_TRACK;\n  LINE_TRACK_SCHEDULE_NUMBER : {schedule};\n'
         steps = read('fanuc-ls', (text.replace('/APPL\n', head),), 'fanuc_m10ia').steps
         assert {'conveyor' in step.shift.why for step in steps} == {along}
+
+
+@pytest.mark.parametrize(('line', 'known'), [('t.robhold := TRUE;', False), ('x := 5;', True)])
+def test_a_tool_is_known_after_a_routine_that_does_not_set_it(line, known):
+    text = (MADE / 'bracket.mod').read_text().replace('ConfL', 'sub tTorch;\nConfL')
+    sub = f'PROC sub(PERS tooldata t)\n{line}\nENDPROC\nENDMODULE'
+    step = read('rapid', (text.replace('ENDMODULE', sub),), 'abb_irb1600').steps[-1]
+    assert (step.tool.why == '') == known
 
 
 KRL_TOOL = '$TOOL = {{X 0,Y 0,Z {},A 0,B 0,C 0}}\n'

@@ -59,6 +59,8 @@ _ASSIGNED = re.compile(
     re.I | re.M,
 )
 """What may be a frame, or hold the number of one; and what part of it."""
+_HANDS = re.compile(r'^[ \t]*(?!BAS\b|DEF)\w+[ \t]*\(([^)\r\n]*)\)', re.I | re.M)
+"""A call of a routine, which may set what it is handed."""
 _AFTER = re.compile(r'(?:[ \t]*C_\w+)*[ \t]*\Z', re.I)
 """What may stand behind a target."""
 OTHER_TOOL, OTHER_BASE = (
@@ -149,6 +151,9 @@ class KrlReader(Reader):
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
+        for call in _HANDS.finditer(self.text):
+            for name in re.findall(r'\w+', call[1].lower()):
+                self.again.setdefault(name, self.where(call))
         for file in range(len(self.sources)):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)

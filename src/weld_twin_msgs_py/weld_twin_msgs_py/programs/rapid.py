@@ -79,6 +79,8 @@ _OWN_DATA = re.compile(r'v(?:\d+|max)|z\d+|fine')
 """Speeds and zones that every controller has."""
 _ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.(?!tload\b)\w+)*)\s*:=', re.I)
 """What may be a tool or a work object, and what part of it; what hangs at a tool moves no frame."""
+_READS = ('setsysdata', 'waitwobj', 'dropwobj', 'fcact')
+"""Instructions that are handed a tool or a work object alone, and do not set it."""
 _DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(
@@ -132,9 +134,10 @@ class RapidReader(Reader):
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
+        routines = self.routines_of(_ROUTINE)
+        self._set_by_calls({name.lower(): self.text[slice(*span)] for name, span in routines})
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
-        routines = self.routines_of(_ROUTINE)
         called = self.calls(routines, lambda _: True, _CALLED)
         self.entered = {call[1].lower(): (Frame(call[1]), []) for call in called}
         labels = self.labels() if re.search('|'.join(_DISPLACED), self.text, re.I) else []
@@ -157,6 +160,19 @@ class RapidReader(Reader):
         self._settle_shifts()
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
         return self.program
+
+    def _set_by_calls(self, routines: dict[str, str]) -> None:
+        """Take in what is handed to a routine that may set it: of another file that alone."""
+        for call in _CALL.finditer(self.text):
+            word, handed = call[1].lower(), self.pieces(*call.span(2))
+            text = routines.get(word)
+            if text is None:
+                sets = len(handed) == 1 and word not in _READS
+            else:
+                own = re.findall(r'\w+', text.partition(')')[0].lower())
+                sets = any(each[1].lower() in own for each in _ASSIGNED.finditer(text))
+            for start, end in handed if sets else ():
+                self.again.setdefault(self.text[start:end].lower(), self.where(call, 1))
 
     # Declarations ----------------------------------------------------------------------------
 

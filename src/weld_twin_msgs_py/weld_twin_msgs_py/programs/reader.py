@@ -173,8 +173,8 @@ class Reader(ABC):
         only = own[0] if own else Frame('')
         if not own and self.program.steps:
             self.program.notes.append(
-                f'the program sets no {name}, and that of the robot file was taken; where the controller '
-                'has another, set it in the program'
+                f'the program sets no {name}, and that of the robot file was taken; where the '
+                'controller has another, set it in the program'
             )
         for piece in self.program.pieces:
             exchange(piece, name, inherited, only)

@@ -7,10 +7,8 @@ from numbers import Real
 
 import numpy as np
 import pytest
-from diagnosis_cells import recorded, solved
-from small_arm import small_arm
+from diagnosis_cells import solved
 
-from weld_twin_core.diagnosis import diagnose, pipeline
 from weld_twin_core.effects import effect_from_mapping
 
 NUMBER, TEXT, FLAG = Real, str, bool
@@ -202,22 +200,6 @@ def test_an_unknown_says_where_it_is_on_what_it_depends_and_carries_its_curve():
     assert {site.effect for site, _ in cause.name} == {'joint_curve'}
     assert {effect.name for effect in answer.model.found} == {'joint_curve'}
     assert answer.shrink.ratio < 0.5
-
-
-@pytest.mark.parametrize('exclude', [(), ('joint_compliance',)])
-def test_predictions_hear_that_something_without_a_name_is_at_work(monkeypatch, exclude):
-    heard, whole = [], pipeline.allowed
-
-    def spied(*given, nameless):
-        heard.append(nameless)
-        return whole(*given, nameless=nameless)
-
-    monkeypatch.setattr(pipeline, 'allowed', spied)
-    spring = {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 1.2e-5}
-    stations = recorded(small_arm(), [spring], static=25, orientation=False)
-    found = diagnose([stations], small_arm(), exclude=exclude, experiment=False)
-    assert (found.status == 'unknown') is bool(exclude)
-    assert heard[-1] is bool(exclude)
 
 
 def test_the_shrink_is_the_ratio_of_its_own_figures_inside_its_interval(answer):

@@ -74,16 +74,6 @@ def test_each_cause_says_which_effect_it_is_and_the_shares_make_a_whole():
     assert told['learned'] == told['confidence'] and told['sure'] in (True, False)
 
 
-def test_what_is_found_given_back_as_known_leaves_the_rest_as_told_as_before():
-    whole = found()
-    known = whole.effects[0].effect
-    rest = diagnose([cell()], load(ARM), align='base,tool', known=[known], experiment=False)
-    before = [group for group in sites(whole) if (known.name, known.site) not in group]
-    assert rest.status in NAMING
-    for group in before:
-        assert any(group & other for other in sites(rest)), (group, sites(rest))
-
-
 def test_with_a_family_taken_out_the_others_are_told_and_that_something_is_left():
     told = found(exclude=('link_twist',))
     held = [own for own, c in zip(holding(told), TRUE, strict=True) if c['effect'] != 'link_twist']

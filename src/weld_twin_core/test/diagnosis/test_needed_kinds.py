@@ -70,8 +70,14 @@ class Arm:
         return self.frames(bent, rows)[-1][:3, 3]
 
 
-def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1, beside=()):
+def told(half, **drawn):
     """Return the kinds that are named for an arm measured at stations, by their names."""
+    families = weighed(half, **drawn).families
+    return {f.effect: f for f in families if f.missed(Beliefs().family_worth)}
+
+
+def weighed(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1, beside=()):
+    """Return all kinds as they are weighed for an arm measured at stations."""
     robot = wt.load('ur10')
     rng = np.random.default_rng(seed)
     q = MIDDLE + rng.uniform(-1.0, 1.0, (count, 6)) * half
@@ -88,8 +94,7 @@ def told(half, *, springs=None, changes=(), align='base,tool', count=60, seed=1,
     fit, scale, precision = many_small(problem, start, rest, Beliefs(), lambda text: None)
     many = replace(few, final=fit, scale=scale, precision=precision, candidate_sets=(), dense=True)
     unseen = Unseen.of(problem, scale, fit, precision)
-    families = weighed_families(many, unseen, Beliefs())
-    return {f.effect: f for f in families if f.missed(Beliefs().family_worth)}
+    return weighed_families(many, unseen, Beliefs())
 
 
 def test_sag_of_two_axes_among_dozens_of_small_errors_is_named_with_its_joints():
@@ -135,6 +140,37 @@ def test_what_not_every_arm_has_is_named_only_beside_all_that_every_arm_has():
     wobbling = tuple(BearingTilt(joint, [1e-5] * 4) for joint in wt.load('ur10').joint_names[1:4])
     named = set(told(0.5, changes=turned, beside=wobbling))
     assert 'link_twist' in named and named <= {'joint_offset', 'link_twist'}
+
+
+@pytest.fixture(scope='module')
+def two_kinds():
+    """Return an arm with a wrong length and a wrong twist, weighed."""
+    return weighed(1.2, changes=[(1, 'a', 3e-4), (2, 'alpha', 6e-4)])
+
+
+def test_kinds_that_are_each_doubted_are_one_set_where_that_is_believed(two_kinds):
+    before = {f.effect: f for f in two_kinds.families}
+    named = [f for f in two_kinds.families if f.missed(Beliefs().family_worth)]
+    assert {f.effect for f in named} == {'link_length', 'link_twist'}
+    as_one = two_kinds.joined(
+        [replace(f, named=True) for f in named], lambda f, _: 0.4 + 0.3 * bool(f.joined)
+    )
+    [whole] = [f for f in as_one if f.joined]
+    assert {whole.effect, *whole.joined} == {'link_length', 'link_twist'}
+    assert {site.effect for site, _ in whole.like} >= set(whole.joined)
+    assert whole.share == pytest.approx(sum(f.share for f in named))
+    assert sum(f.share for f in as_one) == pytest.approx(sum(f.share for f in before.values()))
+    # Without both unseen data are worse off than without either.
+    assert whole.growth > max(f.growth for f in named)
+    assert [f.effect for f in as_one if f.missed(Beliefs().family_worth)] == [whole.effect]
+
+
+@pytest.mark.parametrize('probability', [0.4, 0.6])
+def test_kinds_that_are_believed_by_themselves_or_not_even_together_stay_as_they_are(
+    two_kinds, probability
+):
+    named = [replace(f, named=f.missed(0.1)) for f in two_kinds.families]
+    assert two_kinds.joined(named, lambda *_: probability) == two_kinds.families
 
 
 def test_noise_alone_gets_no_kind():

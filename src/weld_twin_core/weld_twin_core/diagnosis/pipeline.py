@@ -206,12 +206,16 @@ def _conclude(
     expected = LEAST_NOISE * sqrt(NOISE_TRUST / result.problem.size) if result.dense else 0.0
     floor = noise_floor(result.problem, residuals, expected)
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
-    families = weighed_families(result, unseen, beliefs) if result.dense else None
+    weighed = weighed_families(result, unseen, beliefs) if result.dense else None
+    families = None if weighed is None else weighed.families
     evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs, with_strays)
     table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
     verdict = decide(evidence, beliefs)
+    if weighed is not None:
+        families = weighed.joined(verdict.families, statements.believed)
+        verdict = decide(replace(evidence, families=families), beliefs)
     alternative = curved(result, verdict, beliefs)
     verdict = no_noise(verdict, alternative, beliefs)
     unseen.forget_other_parts()

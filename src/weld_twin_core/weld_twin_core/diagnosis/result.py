@@ -179,6 +179,8 @@ class Family:
     """Whether the verdict names it; one that it does not is exchangeable here."""
     alike: tuple[tuple[Site, ...], ...] = ()
     """Which of the members needed are one error everywhere, and share what it does evenly."""
+    joined: tuple[str, ...] = ()
+    """Other kinds that it is one set with: one of them is likelier right than wrong, and none alone."""
 
     def group(self, site: Site) -> tuple[Site, ...]:
         """Return the members that are the same error as one everywhere, itself included."""

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
+from weld_twin_core.effects.registry import REGISTRY
 
 from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import FEW, alike_by_structure, levels_of, numbers, whole
@@ -208,12 +209,14 @@ def _of_many(
 
     Every name is at work there: one is right if half of what it is said to do is there.
     """
-    verdict = row['verdict']
+    verdict, truth = row['verdict'], row['truth']
+    there = [own for own in row['there'] if own is not None]
+    foreign = bool(truth['excluded']) or any(e not in REGISTRY for e, _ in truth['sites'])
     for said in row['statements']:
         kind, level = said['kind'], said['kind'].split()[0]
         right, sure = whole_right, bool(verdict['sure'])
-        if kind == 'nameless':  # all that is at work there has a name
-            right = sure = False
+        if kind == 'nameless':
+            right, sure = foreign and not any(own['name'] >= HALF for own in there), False
         elif kind != 'name' and not kind.endswith('many'):
             continue
         elif said['cause'] is not None:

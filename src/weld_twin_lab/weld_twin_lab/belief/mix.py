@@ -8,7 +8,8 @@ check, with a quarter of the cases outside the library or withheld from it; a th
 poor. The other has cells with one to six causes at once, as real cells have them: every number is
 equally often, and in a fifth of the cases the family of one cause is taken out of the library. The third
 has arms that are off by a little everywhere, as every arm is, mostly at stations, with none to two
-causes besides. The plant's statics are true: a spring settles where it balances the load.
+causes besides. The fourth has such arms with something besides that the library lacks, as every real arm
+has. The plant's statics are true: a spring settles where it balances the load.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blind.blind_cell import WAYS, poorer
-from ..blind.cause_sizes import CONSTRUCTIONS, FAMILIES, MOVING, Cause, site, uneven_errors
+from ..blind.cause_sizes import CONSTRUCTIONS, FAMILIES, MOVING, OUTSIDE, Cause, rough_gears, site, uneven_errors
 from ..blind.deck import KINDS, ROBOTS, Deck, Lot, lots
 from ..blind.making import SealedCase, draw_case
 
-USUAL, SEVERAL, EVERYWHERE = 'usual', 'several', 'everywhere'
+USUAL, SEVERAL, EVERYWHERE, FOREIGN = 'usual', 'several', 'everywhere', 'foreign'
 """Mixes of cases."""
 SHARES = {**KINDS, 'outside': 6, 'withheld': 6}
 """Of 44 usual cases, how many are of each kind."""
@@ -85,6 +86,8 @@ def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
         return _of_several(seed, number)
     if mix == EVERYWHERE:
         return _of_everywhere(seed, number)
+    if mix == FOREIGN:
+        return _with_foreign(seed, number)
     lot = mixed(seed, number + 1)[number]
     ways = Deck(POOR, seed, 60)
     poor = [ways.next() for _ in range(number + 1)][number]
@@ -112,9 +115,27 @@ def _of_several(seed: int, number: int) -> Drawn:
 
 def _of_everywhere(seed: int, number: int) -> Drawn:
     rng = np.random.default_rng([seed, 4000 + number])
+    return _off_everywhere(number, rng)
+
+
+def _with_foreign(seed: int, number: int) -> Drawn:
+    """Return an arm that is off everywhere beside what no name explains, by turns of three ways."""
+    rng = np.random.default_rng([seed, 5000 + number])
+    if number % 3 == 0:
+        still = [name for name in OUTSIDE if name not in MOVING]
+        return _off_everywhere(number, rng, (str(rng.choice(still)),))
+    out = _off_everywhere(number, rng)
+    if number % 3 == 1:
+        withheld = str(rng.choice(sorted({own['effect'] for own in out.small})))
+        return out._replace(case=replace(out.case, excluded=(withheld,)))
+    return out._replace(small=(*out.small, *rough_gears(out.case.cell.robot, rng)))
+
+
+def _off_everywhere(number: int, rng: np.random.Generator, foreign: tuple[str, ...] = ()) -> Drawn:
     align = ALIGN[int(rng.integers(len(ALIGN)))]
     cards = [name for name in COMMON if name not in {f'{frame}_pose' for frame in align}]
-    causes = tuple(map(str, rng.choice(cards, int(rng.integers(3)), replace=False)))
+    own = map(str, rng.choice(cards, int(rng.integers(3)), replace=False))
+    causes = (*own, *foreign)
     lot = Lot(
         'several' if causes else 'none',
         ROBOTS[number % len(ROBOTS)],

@@ -171,9 +171,9 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
     words = [_levels(case, own) for own in sites]
 
     def part_of(told: Told) -> dict[str, float] | None:
-        kind = told.name[0][0].effect if told.name and not told.rest else None
-        names = [(str(own.effect), own.joint) for own, _ in told.name]
-        gone = [e for e in model.found if e.name == kind and (e.name, e.site) in names]
+        names = [] if told.rest else [(str(own.effect), own.joint) for own, _ in told.name]
+        own = [model.found[k] for k in told.members]
+        gone = [e for e in own if (e.name, e.site) in names]
         if not gone:
             return None
         rest = model.with_found(tuple(e for e in model.found if e not in gone))
@@ -194,11 +194,13 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
 
 
 def _kinds(case: SealedCase, names: Sequence[Site]) -> list[set[Site]]:
-    """Return the sites named of every kind, with all that are the same error."""
+    """Return the sites named of every kind, and of all, with all that are the same error."""
     robot = case.lot.robot
+    alike = [(own[0], alike_by_structure(robot, own)) for own in names]
+    kinds = [{kind} for kind, _ in alike]
     return [
-        set[Site]().union(*(alike_by_structure(robot, own) for own in names if own[0] == kind))
-        for kind in dict.fromkeys(own[0] for own in names)
+        set[Site]().union(*(each for kind, each in alike if kind in among))
+        for among in (*kinds, {kind for kind, _ in alike})
     ]
 
 

@@ -399,6 +399,13 @@ RIPPLE = 2e-4
 """Usual amplitude of one order of a gear's ripple [rad], as `cause_sizes` has it."""
 LOW_ORDERS = (1, 2)
 """Of the ripple that every gear has, beside one that is drawn."""
+ROUGH = 3e-5
+"""Usual amplitude of each of many orders [rad]: together they move the tool of two measured arms by
+a fifth of a millimetre."""
+ROUGH_PARTS = (0.3, 3.0)
+"""Of that, from arm to arm; even logarithms."""
+ROUGH_ORDERS = range(3, 31)
+"""Orders that the gears of these two arms have alike; above, they fall."""
 
 
 def small_errors(robot: Robot, rng: np.random.Generator, part: float = 1.0) -> list[Cause]:
@@ -427,7 +434,23 @@ def uneven_errors(robot: Robot, rng: np.random.Generator, part: float) -> list[C
     for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
         for order in () if slides else (*LOW_ORDERS, int(rng.choice(RIPPLE_ORDERS))):
             amplitude = RIPPLE * part * abs(float(rng.standard_t(FREEDOM)))
-            phase = float(rng.uniform(-np.pi, np.pi))
-            waves = {'order': order, 'amplitude': amplitude, 'phase': phase}
-            out.append({'effect': 'transmission_ripple', 'joint': joint, **waves})
+            out.append(_wave(joint, order, amplitude, rng))
     return out
+
+
+def rough_gears(robot: Robot, rng: np.random.Generator) -> list[Cause]:
+    """Return gears that run unevenly at every order: too many for some dozens of stations to tell."""
+    part = ROUGH * float(np.exp(rng.uniform(*np.log(ROUGH_PARTS))))
+    out = []
+    for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
+        for order in () if slides else ROUGH_ORDERS:
+            amplitude = part * abs(float(rng.standard_normal()))
+            out.append(_wave(joint, order, amplitude, rng))
+    return out
+
+
+def _wave(joint: str, order: int, amplitude: float, rng: np.random.Generator) -> Cause:
+    """Return one order of a gear's ripple, at any phase."""
+    phase = float(rng.uniform(-np.pi, np.pi))
+    waves = {'order': order, 'amplitude': amplitude, 'phase': phase}
+    return {'effect': 'transmission_ripple', 'joint': joint, **waves}

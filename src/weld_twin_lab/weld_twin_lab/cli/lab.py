@@ -215,7 +215,7 @@ PROOFS = {
 --seed N                their seed [default: 1]
 --held-out N            cases to judge on [default: 0]
 --held-out-seed N       their seed [default: 2]
---mix {usual,several,everywhere}  which cells: see docs/trust.md [default: usual]
+--mix {usual,several,everywhere,foreign}  which cells: see docs/trust.md [default: usual]
 --oracle N              of so many of these an oracle that knows the plant is asked, too [default: 0]
 --learn-from TABLE ...  tables kept from other runs
 --judge-on TABLE ...    tables kept from other runs

@@ -61,6 +61,12 @@ class Stated:
         nameless = 0.0 if self.nameless is None else self.nameless.probability
         return replace(evidence, believed=believed, nameless=nameless)
 
+    def believed(self, family: Family, kinds: int) -> float:
+        """Return how probable it is that a kind of many small errors is right, of so many named."""
+        names = len(family.needed) + len(family.like)
+        features = {**self.situation, **of_kind(family, names, kinds, self.floor)}
+        return usual_calibration().probability('name of many', features)
+
 
 def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stated:
     """Return how probable it is of every effect found that a name is right, or that none can be."""
@@ -150,7 +156,8 @@ def _stated_of(
         return _of_row(cause, row, *_probabilities(levels)), levels
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
-        kind = of_kind(cause, family, len(families), before.floor)
+        kinds = sum(1 + len(one.joined) for one in families.values())
+        kind = of_kind(family, len(cause.name), kinds, before.floor)
         each = (*both, 'name')
         levels = [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
         return _of_kind(cause, *_probabilities(levels)), levels

@@ -183,11 +183,12 @@ def of_rest(cause: Cause, level: str) -> Numbers:
     )
 
 
-def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
+def of_kind(family: Family, names: int, kinds: int, floor: float) -> Numbers:
     """
     Return the features of a kind of many small errors.
 
     family: how unseen data get worse without it.
+    names: in its set.
     kinds: how many are named: one or two alone stand in for a cause without a name more often.
     floor: noise [m].
     """
@@ -196,7 +197,7 @@ def of_kind(cause: Cause, family: Family, kinds: int, floor: float) -> Numbers:
             'growth': log1(family.growth),
             'least growth': log1(min(family.growths, default=0.0)),
             'size': log(family.rms_m / floor),
-            'members': len(cause.name),
+            'members': names,
             'kinds': kinds,
         }
     )

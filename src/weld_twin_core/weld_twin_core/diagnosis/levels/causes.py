@@ -280,7 +280,8 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[Cause]:
         effects = {Site.of(effect): effect for effect in reversed(model)}
         place = marginal((effects[site].at, part) for site, part in sites)
         dependence = marginal((effects[site].on, part) for site, part in sites)
-        members = tuple(k for k, effect in enumerate(model) if effect.name == family.effect)
+        kinds = {family.effect, *family.joined}
+        members = tuple(k for k, effect in enumerate(model) if effect.name in kinds)
         group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
         levels = place, dependence, dict(sites)
         out.append(_cause(members, *levels, share=family.share, effect=group))

@@ -10,14 +10,18 @@ only together, as wrong lengths and twists do: where none takes enough off by it
 that not every arm has is one of them only where unseen data get worse without it beside all that every
 arm has. Each is then taken out of what was chosen, with all others and the frames fitted anew: a kind
 is needed where unseen data get worse. What would do as well in its place is reported beside it.
+
+Of kinds that are each likelier wrong than right, as they take each other's place, one of them may be
+right beyond much doubt: two or three of them are one set, if unseen data bear that out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +32,7 @@ from ...effects.effect import Effect
 from ..algebra.motions import same_error
 from ..algebra.noise_floor import NANOMETRE
 from ..beliefs import Beliefs
-from ..evidence import Search
+from ..evidence import LIKELIER, Search
 from ..result import Family, Site
 from ..unseen.folds import growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen
@@ -36,9 +40,64 @@ from .small_errors import believed
 
 MOST_LIKE = 2
 """Kinds reported beside one at the most; what more than three would explain is no name."""
+JOINED = (2, 1 + MOST_LIKE)
+"""Kinds that are put together to one set."""
 
 
-def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
+Believed = Callable[[Family, int], float]
+"""How probable it is that a kind is right, where so many are named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """Kinds of error, and what models of some of them leave on unseen data."""
+
+    families: tuple[Family, ...]
+    case: _Case
+
+    def joined(self, verdict: Sequence[Family], believed: Believed) -> tuple[Family, ...]:
+        """
+        Return the kinds with those put together that are likelier right than wrong as a set alone.
+
+        verdict: the kinds as a verdict has them that puts none together.
+        """
+        named = [one for one in verdict if one.named and one.needed]
+        told = [one for one in named if believed(one, len(named)) > LIKELIER]
+        chosen = [one for one in verdict if one.chosen and self.case.named(one.effect)]
+        doubted = [one for one in chosen if one.effect not in {own.effect for own in told}]
+        while (best := self._set(doubted, chosen, told, believed)) is not None:
+            told.append(best)
+            doubted = [one for one in doubted if one.effect not in {best.effect, *best.joined}]
+        sets = {one.effect: one for one in told if one.joined}
+        gone = {name for one in sets.values() for name in one.joined}
+        return tuple(
+            replace(one, chosen=False, share=0.0)
+            if one.effect in gone
+            else sets.get(one.effect, one)
+            for one in self.families
+        )
+
+    def _set(
+        self,
+        doubted: Sequence[Family],
+        chosen: Sequence[Family],
+        told: Sequence[Family],
+        believed: Believed,
+    ) -> Family | None:
+        """Return the fewest of the kinds doubted that are likelier right than wrong together."""
+        kinds = sum(1 + len(one.joined) for one in told)
+        for size in JOINED:
+            sets = [self.case.together(group, chosen) for group in combinations(doubted, size)]
+            each = [
+                (believed(one, kinds + size), one) for one in sets if one.missed(self.case.worth)
+            ]
+            probability, best = max(each, key=itemgetter(0), default=(0.0, None))
+            if probability > LIKELIER:
+                return best
+        return None
+
+
+def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> Weighed:
     """
     Return what every kind of the final model accounts for on unseen data.
 
@@ -55,9 +114,10 @@ def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[
     bare, remaining = (case.mean_square(kept) for kept in ((), case.of_kinds(chosen)))
     explained = max(1.0 - remaining / max(bare, NANOMETRE**2), 0.0)
     whole = max(sum(one.rms_m**2 for one in out if one.chosen), NANOMETRE**2)
-    return tuple(
+    shared = (
         replace(one, share=explained * one.rms_m**2 / whole) if one.chosen else one for one in out
     )
+    return Weighed(tuple(shared), case)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +290,25 @@ class _Case:
         reported = tuple((self._largest(others, instead), part) for part, instead in like)
         needed, alike = self._needed(others, own)
         return replace(out, needed=needed, alike=alike, like=reported)
+
+    def together(self, group: Sequence[Family], chosen: Sequence[Family]) -> Family:
+        """Return some kinds as one set: what they account for together, and the largest before all."""
+        first, *more = sorted(group, key=lambda one: -one.rms_m)
+        out = {one.effect for one in group}
+        every = self.of_kinds(one.effect for one in chosen)
+        others = self.of_kinds(one.effect for one in chosen if one.effect not in out)
+        fall = max(self.mean_square(others) - self.mean_square(every), 0.0)
+        like = [member for one in more for member in one.needed]
+        room = 1 + MOST_LIKE - len(group)
+        like += [item for item in first.like if item[0].effect not in out][:room]
+        return replace(
+            first,
+            growths=tuple(self.growth(every, others).tolist()),
+            rms_m=float(np.sqrt(fall)),
+            like=tuple(like),
+            share=sum(one.share for one in group),
+            joined=tuple(one.effect for one in more),
+        )
 
     def _needed(
         self, others: Sequence[int], own: Sequence[int]

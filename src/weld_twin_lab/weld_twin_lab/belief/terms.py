@@ -37,7 +37,7 @@ NAMED = {
 MANY = {
     'growth': 1,
     'least growth': 1,
-    'size': 1,
+    'size over left': 1,
     'rows': 0,
     'structure': -1,
     'kinds': 1,
@@ -84,7 +84,7 @@ TERMS: dict[str, dict[str, int]] = {
         'wander': 0,
     },
     # A set with more names is likelier to hold the right one.
-    'name of many': {**MANY, 'left': 0, 'members': 1},
+    'name of many': {**MANY, 'members': 1},
     'place of many': MANY,
     'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from ..algebra.definite import ROUNDING
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Row, Verdict, marginal
 from ..result import NAMING, Cause, Family
@@ -52,8 +53,8 @@ class Stated:
     found."""
     situation: Features
     """Features of the diagnosis as a whole."""
-    floor: float
-    """Noise [m]."""
+    errors: tuple[float, float]
+    """RMS [m] of the noise, and of what is left on unseen data."""
 
     def put_to(self, evidence: Evidence) -> Evidence:
         """Return evidence with what is believed of the names, and that a cause has none."""
@@ -64,16 +65,19 @@ class Stated:
     def believed(self, family: Family, kinds: int) -> float:
         """Return how probable it is that a kind of many small errors is right, of so many named."""
         names = len(family.needed) + len(family.like)
-        features = {**self.situation, **of_kind(family, names, kinds, self.floor)}
+        features = {**self.situation, **of_kind(family, names, kinds, *self.errors)}
         return usual_calibration().probability('name of many', features)
 
 
 def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stated:
     """Return how probable it is of every effect found that a name is right, or that none can be."""
     learned = usual_calibration()
-    situation = of_situation(evidence, beliefs)
+    situation, errors = (
+        of_situation(evidence, beliefs),
+        (evidence.noise, max(evidence.after, ROUNDING)),
+    )
     if evidence.families is not None:
-        return Stated(table, (), None, situation, evidence.noise)
+        return Stated(table, (), None, situation, errors)
     sizes = [size / evidence.noise for size in evidence.sizes]
     each = list(zip(table, sizes, evidence.wandered, evidence.missed, strict=False))
     on = evidence.structure.depends_on
@@ -84,10 +88,10 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
         every.append(of_name(row, size, wandered, missed, beside, on, travel))
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
-        return Stated(table, (), None, situation, evidence.noise)
+        return Stated(table, (), None, situation, errors)
     whole = of_whole([one.probability for one in names], [one.features for one in names])
     nameless = _told('nameless', None, {**situation, **whole}, learned)
-    return Stated(table, names, nameless, situation, evidence.noise)
+    return Stated(table, names, nameless, situation, errors)
 
 
 def _travel(evidence: Evidence, row: Row) -> float:
@@ -157,7 +161,7 @@ def _stated_of(
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
         kinds = sum(1 + len(one.joined) for one in families.values())
-        kind = of_kind(family, len(cause.name), kinds, before.floor)
+        kind = of_kind(family, len(cause.name), kinds, *before.errors)
         each = (*both, 'name')
         levels = [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
         return _of_kind(cause, *_probabilities(levels)), levels

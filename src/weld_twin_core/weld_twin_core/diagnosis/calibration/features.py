@@ -183,7 +183,7 @@ def of_rest(cause: Cause, level: str) -> Numbers:
     )
 
 
-def of_kind(family: Family, names: int, kinds: int, floor: float) -> Numbers:
+def of_kind(family: Family, names: int, kinds: int, floor: float, left: float) -> Numbers:
     """
     Return the features of a kind of many small errors.
 
@@ -191,12 +191,14 @@ def of_kind(family: Family, names: int, kinds: int, floor: float) -> Numbers:
     names: in its set.
     kinds: how many are named: one or two alone stand in for a cause without a name more often.
     floor: noise [m].
+    left: on unseen data, RMS [m]; of real arms it is far above the noise, however right a kind is.
     """
     return plain(
         {
             'growth': log1(family.growth),
             'least growth': log1(min(family.growths, default=0.0)),
             'size': log(family.rms_m / floor),
+            'size over left': log(family.rms_m / left),
             'members': names,
             'kinds': kinds,
         }

@@ -146,7 +146,7 @@ def judged(families, gain=0.0, sure=0.0):
     # Without a structure what is left is near the floor; with one it is more than what is named.
     left = 3.6e-4 if gain else 5e-5
     found = SimpleNamespace(final=result, problem=unseen.problem, precision=np.ones(6))
-    weighed = weighed_families(found, unseen, Beliefs())
+    weighed = weighed_families(found, unseen, Beliefs()).families
     return decide(
         Evidence(
             candidate_sets=(),

@@ -19,8 +19,8 @@ from .algebra.open_directions import keep_open_directions
 from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
-from .calibration.calibrated import stated
-from .evidence import LIKELIER, Row, Search, beyond_doubt
+from .calibration.calibrated import Stated, stated
+from .evidence import LIKELIER, Evidence, Row, Search, Verdict, beyond_doubt
 from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
 from .hypotheses.search import borne_out, search
@@ -28,7 +28,7 @@ from .hypotheses.selection import implausible
 from .levels.curved import choose_model, curved, locate_gap, no_noise
 from .levels.gathered import gathered
 from .many.fitted_together import fitted_together
-from .many.weighed_families import weighed_families
+from .many.weighed_families import Weighed, weighed_families
 from .predicting.allowed import allowed, elsewhere
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink, Structure
@@ -212,10 +212,7 @@ def _conclude(
     table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
-    verdict = decide(evidence, beliefs)
-    if weighed is not None:
-        families = weighed.joined(verdict.families, statements.believed)
-        verdict = decide(replace(evidence, families=families), beliefs)
+    verdict = _decided(evidence, weighed, statements, beliefs)
     alternative = curved(result, verdict, beliefs)
     verdict = no_noise(verdict, alternative, beliefs)
     unseen.forget_other_parts()
@@ -232,6 +229,17 @@ def _conclude(
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
+
+
+def _decided(
+    evidence: Evidence, weighed: Weighed | None, statements: Stated, beliefs: Beliefs
+) -> Verdict:
+    """Return the verdict; kinds of many errors that are doubted by themselves are put together."""
+    verdict = decide(evidence, beliefs)
+    if weighed is None:
+        return verdict
+    families = weighed.joined(verdict.families, statements.believed)
+    return decide(replace(evidence, families=families), beliefs)
 
 
 def _borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:

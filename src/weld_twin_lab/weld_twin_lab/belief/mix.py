@@ -21,7 +21,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blind.blind_cell import WAYS, poorer
-from ..blind.cause_sizes import CONSTRUCTIONS, FAMILIES, MOVING, OUTSIDE, Cause, rough_gears, site, uneven_errors
+from ..blind.cause_sizes import (
+    CONSTRUCTIONS,
+    FAMILIES,
+    MOVING,
+    OUTSIDE,
+    Cause,
+    rough_gears,
+    site,
+    uneven_errors,
+)
 from ..blind.deck import KINDS, ROBOTS, Deck, Lot, lots
 from ..blind.making import SealedCase, draw_case
 

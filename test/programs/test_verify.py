@@ -183,6 +183,15 @@ def test_what_was_corrected_is_not_corrected_twice(cell, tmp_path):
     assert said.code == 2 and 'corrected already' in said.err and not (tmp_path / 'again').exists()
 
 
+def test_that_the_robot_file_was_changed_since_the_diagnosis_is_said(cell, tmp_path):
+    words = ('correct', MADE / FILES[0], '--model', cell / 'found' / 'diagnosis.json', '--robot')
+    other = tmp_path / 'robot.yaml'
+    other.write_text((cell / 'robot.yaml').read_text() + '# of today\n')
+    for robot, changed in ((cell / 'robot.yaml', False), (other, True)):
+        said = weld_twin(*words, robot, '--out', tmp_path / f'out{changed}')
+        assert said.code == 0 and ('is not as it was' in said.out) == changed
+
+
 def test_a_program_of_which_no_point_was_moved_may_be_corrected(cell, tmp_path):
     (tmp_path / 'none.yaml').write_text('[]')
     words = ('--robot', cell / 'robot.yaml', '--out')

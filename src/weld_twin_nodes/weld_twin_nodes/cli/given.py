@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import fields, replace
 from pathlib import Path
@@ -300,6 +300,18 @@ def inputs_of(**files: str | Sequence[str]) -> list[InputFile]:
         for use, paths in files.items()
         for path in ([paths] if isinstance(paths, str) else paths)
         if path and (use != 'robot' or Path(path).is_file())
+    ]
+
+
+def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
+    """Return that a robot file is another than at a diagnosis, which looks at its joints alone."""
+    was = [each['sha256'] for each in content.get('inputs') or () if each.get('use') == 'robot']
+    now = [item.sha256 for item in inputs_of(robot=path)]
+    if not was or not now or now == was:
+        return []
+    return [
+        f"the robot file '{path}' is not as it was when the diagnosis was made; masses, frames and "
+        'limits count as they are now'
     ]
 
 

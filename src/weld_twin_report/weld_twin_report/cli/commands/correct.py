@@ -13,7 +13,7 @@ from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
 from weld_twin_msgs_py.programs.languages import corrected_twice, language_of
 from weld_twin_msgs_py.programs.source import read_source
-from weld_twin_nodes.cli.given import Given, inputs_of, quantity, say_doubts
+from weld_twin_nodes.cli.given import Given, changed_robot, inputs_of, quantity, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
 from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
@@ -121,7 +121,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
         program, context, model, caps, given.read_start(context), other_readings(content)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
-    entry['notes'] += correcting.other_causes(content)
+    entry['notes'] += correcting.other_causes(content) + changed_robot(content, given.robot)
     if given.tolerance:
         tolerance = _length(given.tolerance, '--tolerance')
         noise = _length(given.noise or NOISE, '--noise')

@@ -119,34 +119,23 @@ def sheet(program: Exported, language: str, file: str, speeds: str, notes: Seque
     when = 'while the arm stands' if program.stations else 'from the first to the last move'
     minutes = sum(m.duration + m.dwell for m in program.moves) / 60.0
     x, y, z = program.tool[:3, 3] * 1e3
-    rows = [
+    parts = [
         f'# {file}',
-        '',
         f'{len(program.moves)} moves, about {minutes:.1f} minutes. {speeds}',
-        '',
-    ]
-    rows += [f'- {text}' for text in program.comments]
-    rows += ['', '## Load it', '', load, '']
-    rows += [
+        '\n'.join(f'- {text}' for text in program.comments),
+        f'## Load it\n\n{load}',
         f'The tool must be {x:.3f} {y:.3f} {z:.3f} mm from the flange, as in the robot file.',
-        '',
-    ]
-    rows += ['## Run it first', '']
-    rows += [
-        '1. Check every point for collisions: the file knows the arm, not your cell.',
-        '2. Run it in manual mode at reduced speed, with a hand on the enabling switch.',
+        '## Run it first',
+        '1. Check every point for collisions: the file knows the arm, not your cell.\n'
+        '2. Run it in manual mode at reduced speed, with a hand on the enabling switch.\n'
         '3. Only then run it in automatic mode and record.',
-        '',
+        '\n'.join(f'- {note}' for note in notes),
+        f'## Record\n\n{record}',
+        f'The instrument measures at: {output}, on {when}.',
+        'Bring joints and measured positions into one table, a column for every joint and x, y, z,\n'
+        'and read it with `weld-twin import TABLE.csv --robot ROBOT --out BAG`.\n',
     ]
-    rows += [f'- {note}' for note in notes] + ([''] if notes else [])
-    rows += ['## Record', '', record, '']
-    rows += [f'The instrument measures at: {output}, on {when}.', '']
-    rows += [
-        'Bring joints and measured positions into one table, a column for every joint and x, y, z,',
-        'and read it with `weld-twin import TABLE.csv --robot ROBOT --out BAG`.',
-        '',
-    ]
-    return '\n'.join(rows)
+    return '\n\n'.join(filter(None, parts))
 
 
 BLEND = 1e-3

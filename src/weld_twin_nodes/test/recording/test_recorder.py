@@ -46,7 +46,8 @@ def motion(samples):
 def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushed(cell, tmp_path):
     parameters = {'out': tmp_path / 'bag', 'flush_every': 0.05, 'reliable_inputs': 'true'}
     words = [f'-p {name}:={value}' for name, value in parameters.items()]
-    command = f'{sys.executable} -m weld_twin_nodes.live.recorder --ros-args {" ".join(words)}'
+    # What it compiles would be cut off, too, and stay: -B.
+    command = f'{sys.executable} -B -m weld_twin_nodes.live.recorder --ros-args {" ".join(words)}'
     recorder = cell.start(['sh', '-c', f'ulimit -f {BLOCKS}; exec {command}'])
     publisher = cell.publisher()
     cell.trigger('/recorder/counts')

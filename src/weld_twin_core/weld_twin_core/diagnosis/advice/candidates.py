@@ -46,8 +46,7 @@ _EVERY = 0.1
 _SLOWER = 2.0
 """How much slower a recorded seam is run again."""
 _ANOTHER = 20.0
-"""Time [min] to set up an instrument that follows the tool where so far only stations were
-measured."""
+"""Time [min] to set up an instrument that follows the tool where only stations were measured."""
 
 
 class Piece(NamedTuple):

@@ -22,10 +22,9 @@ DECIDES = 6.0
 NOTHING = 3.0
 """Standard deviations below which it changes no verdict."""
 _MARGIN = 2.5
-"""An experiment is made so long that it parts its explanations by this factor more than a decision
-needs: how far they will part is foreseen with the effects as they are believed to be, and a diagnosis
-counts fewer independent samples than are foreseen. With 1.5, two experiments that were to part theirs
-by 9 and 12 standard deviations did not."""
+"""Factor by which an experiment parts explanations more than a decision needs: effects are as large as
+they are believed to be, and a diagnosis counts fewer independent samples than foreseen. With 1.5, two
+experiments that were to part theirs by 9 and 12 standard deviations did not."""
 LEAST = 75.0
 """Time [s] of an experiment at least: what nobody thought of shows only where there is room for it."""
 _NAMED = 3.0

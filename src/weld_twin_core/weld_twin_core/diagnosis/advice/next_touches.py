@@ -40,8 +40,7 @@ from .postures import widened
 _ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
 _SLACK = 5e-6
-"""Noise [m] of a touch at the least: a few touches may be fitted without any rest, and no ball rests
-better than that."""
+"""Noise [m] of a touch at the least: no ball rests better, though few touches may leave nothing."""
 _DETERMINED = 1e-14
 """Share of the strongest direction below which information is rounding."""
 _TRIED = 160

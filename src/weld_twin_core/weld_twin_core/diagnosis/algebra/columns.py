@@ -27,8 +27,7 @@ from .problem import Model, Problem, Scale
 Rows = slice | Index
 """Some rows: a slice, or their numbers."""
 MANY = 32
-"""Coordinates of one effect in a model from which on they are kept as amounts: products of fewer are
-as quick written out."""
+"""Coordinates of one effect in a model from which on they are kept as amounts: fewer are as quick."""
 SHOWN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise to be seen."""
 BLOCKS = 24

@@ -24,13 +24,11 @@ SAFE = 100.0
 Index = NDArray[np.intp]
 
 EMPTY = 1e-300
-"""Least that anything is divided by: keeps a division by what is nothing, as the norm of a column of
-zeros, finite."""
+"""Least that anything is divided by: keeps a division by nothing, as a norm of zeros, finite."""
 ROUNDING = 1e-12
 """Share of a number below which another beside it is its rounding."""
 REPEATED = 1e-11
-"""Added to a diagonal of ones, so that columns that repeat others do no harm; far above rounding, far
-below what a column must add to differ from the others."""
+"""Added to a diagonal of ones, so that columns that repeat others do no harm; far above rounding."""
 FLAT = 1e-9
 """A direction, or a column once others are projected out, of less than this share carries nothing."""
 

@@ -29,13 +29,11 @@ from .noise_floor import NANOMETRE
 from .problem import Model, Problem, Scale
 
 FRAME_SHIFT = 0.02
-"""Spread [m] of a frame's origin about where the alignment put it: alignment starts a fit within
-2 cm, or says so."""
+"""Spread [m] of a frame's origin about where the alignment, which starts within 2 cm, put it."""
 FRAME_TURN = 0.05
 """Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
 STRAIGHT = 1e-6
-"""Share of what is left by which a step may miss what its equations predict, for it to be the last:
-where the residual is as good as linear, another step finds nothing."""
+"""Share of what is left by which a step may miss what its equations predict, for it to be the last."""
 STEADY = 1e-4
 """The same share up to which columns serve for the next step, too: they have hardly turned."""
 DAMPING, DAMPED = FLAT, 1e6

@@ -59,12 +59,10 @@ class Problem:
     changes: tuple[Change, ...] = ()
     """What may differ between the recordings: fitted along in every hypothesis, as frames are."""
     touched: tuple[Unknowns | None, ...] = ()
-    """Where recordings are contacts, one each: what they see of the tool point, and their unknown
-    places; see `touching`. None for a recording that an instrument measured, empty where it
-    measured all."""
+    """What contacts, one recording each, see of the tool point and their unknown places; see
+    `touching`. None for a recording of an instrument, empty where it measured all."""
     given: tuple[int, ...] = ()
-    """Of which of the recordings given each is a part, where places of contacts are parts; empty
-    where each was given by itself."""
+    """Of which of the recordings given each is a part, if places of contacts are parts; else empty."""
     loose: tuple[float, ...] = ()
     """Noise of every recording in that of the surest; empty where all are alike."""
     _taken: WeakKeyDictionary[Scale, list[tuple[Array, Array] | None]] = field(
@@ -461,9 +459,8 @@ class Alone(NamedTuple):
     """What a robot file does by itself, without the effects that it cannot hold."""
 
     changes: tuple[Effect, ...]
-    """What the file has beside the constants of the model, so that it does well by itself; the
-    effects that go with it have the same with the other sign. None where the constants of the
-    model are as good."""
+    """What the file has beside the constants of the model, so that it does well by itself; the effects
+    have the same with the other sign. None where the constants are as good."""
     recorded_m: float
     unseen_m: float
     """RMS that remains with the file alone, where it was recorded and on data not fitted [m]."""

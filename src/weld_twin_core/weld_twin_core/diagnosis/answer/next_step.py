@@ -31,13 +31,11 @@ from ..unseen.groups import Group
 _TOUCHED = 4
 """Explanations compared where contacts measured: every touch that could be made is tried with each."""
 _FORESEEN = 2.0
-"""Factor within which what parts two explanations is foreseen, as one standard deviation: how large the
-effect is, and how many samples are independent, shows only afterwards. A judgement; of five
-experiments that were to part theirs by 6 to 16 standard deviations three did."""
+"""Factor within which what parts two explanations is foreseen, one standard deviation. A judgement; of
+five experiments that were to part theirs by 6 to 16 standard deviations three did."""
 NAMED, GAINED = 0.6, 0.4
-"""Of experiments asked for by answers that name something, the share that decides, where the answer
-has no confidence, and what full confidence adds. Of 21 in cells that this was developed on, 19 did;
-the two others came from answers with 0.3 and 0.55."""
+"""Share of experiments that decide, asked for by answers that name something without confidence, and
+what full confidence adds. Of 21 in development cells 19 did; two, with 0.3 and 0.55, did not."""
 _EVEN = 0.5
 """The same where an explanation without a name is to be found by its place and dependence: too few such
 experiments were seen to promise more than an even chance."""

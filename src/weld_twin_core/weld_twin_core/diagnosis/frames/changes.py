@@ -43,8 +43,7 @@ from ..evidence import Search
 from ..result import Changed, Site
 
 SURE = 3.0
-"""A change is reported from this many standard errors on; of several numbers, the root of their mean
-chi-square. One in four hundred by chance."""
+"""Standard errors from which a change is reported, RMS of several numbers: chance once in 400 times."""
 REWEIGHTED = 6
 """Fits with the weights of the last: so many until an outlier of a hundred noises has lost its own."""
 UNTOLD = 0.9

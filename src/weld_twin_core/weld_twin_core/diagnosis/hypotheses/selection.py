@@ -26,8 +26,7 @@ class _Step(NamedTuple):
     entered: str | None  # what entered, in words
     impossible: list[Effect]  # better ones that no machine has
     passed: bool
-    """Whether one of these was passed over that is of no machine's size: what only has no such shape
-    is another family's, or that of several causes together."""
+    """Whether one of these was passed over that is of no machine's size, not only of no such shape."""
 
 
 def forward(

@@ -30,8 +30,7 @@ RIDGES = (1e-1, 1e1, 1e3)
 MOST = 6
 """More groups than this at once say that nothing simple is at work."""
 SHORTLIST = 6
-"""Groups tried on unseen folds at every step, those that fit best in sample; the right one has
-not been seen below the fourth."""
+"""Groups tried on unseen folds at every step, those that fit best; the right one was within four."""
 
 
 @dataclass(frozen=True, eq=False)

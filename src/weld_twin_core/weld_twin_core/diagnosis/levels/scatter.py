@@ -37,8 +37,7 @@ from ..unseen.unseen_stretches import Unseen
 LEAST = 80
 """Measurements of a recording from which on variances are estimated: ten for each fold."""
 GROSS = 6.0
-"""Squared length over its median from which on a difference holds a stray reading: of three
-coordinates one in 500 does by chance."""
+"""Squared length over its median from which a difference holds a stray: by chance one in 500 does."""
 
 
 def scattered(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Scatter, ...]:

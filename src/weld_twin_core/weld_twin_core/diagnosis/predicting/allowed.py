@@ -52,8 +52,7 @@ from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 POSTURES = 200
 """Enough for a median to be good to some per cent."""
 LEAST = 1e-6
-"""Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
-noise would leave no digits for what is open."""
+"""Least noise of a position per axis [m]: no instrument is better, and some digits must be left."""
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 MOST = 3

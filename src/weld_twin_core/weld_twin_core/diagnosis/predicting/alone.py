@@ -32,8 +32,7 @@ from ..unseen.unseen_stretches import Unseen
 ROWS = 900
 """Rows that the constants are fitted on: three hundred positions show frames and some zeros well."""
 LEAST_GAIN = 0.95
-"""Ratio of what is left below which constants of their own are taken: less is a matter of the
-folds, and numbers that mean the arm itself are worth more than a few per cent."""
+"""Ratio of what is left below which constants of their own are taken: less is a matter of folds."""
 STEPS = 2
 """Steps of a fit that starts nearby; constants are nearly linear."""
 

@@ -37,11 +37,9 @@ ROUGH = 0.5
 """Share of small errors of a usual size from which on all that is left is the arm's. A judgement: of two
 real arms under a tracker it is 0.3 to 0.6, and their stations repeat better than models predict."""
 NEIGHBOURS = (2, 8, 32, 128)
-"""Samples that are looked at together for what they have in common: two show what changes from one to
-the next, a hundred what is a tenth of the noise."""
+"""Samples that are looked at together: two show what changes fast, a hundred a tenth of the noise."""
 AGREED = 2.5
-"""Standard errors from which on what neighbours have in common is no chance: of four numbers of them,
-agreeing or not, chance gets so far once in twenty at the most."""
+"""Standard errors from which neighbours agree by no chance, which gets so far once in twenty times."""
 IN_COMMON = np.logspace(-8.0, 0.0, 161)
 """Parts of what is left that neighbours may have in common. Before the data every decade is as likely as
 every other, down to that of a ten-thousandth of the size, which is none (`sizes.SIZES`)."""
@@ -61,11 +59,9 @@ FEW = 12
 PEAK = np.sqrt(3)
 """Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
 STRAYED = 1.5
-"""Times what chance makes of the largest miss in a fold from which on it is more than chance: the
-largest of a hundred varies by a tenth."""
+"""Times the largest miss of chance in a fold from which on it is more: that varies by a tenth."""
 CLEAR = 2.0
-"""Standard errors by which more must be left there than elsewhere: a bound that is too wide does
-less harm than one too narrow."""
+"""Standard errors by which more must be left there: a bound too wide does less harm than too narrow."""
 
 Given = Callable[[Products], tuple[Array, Array]]
 """Mean and covariance of the coordinates given all rows but those of a part."""

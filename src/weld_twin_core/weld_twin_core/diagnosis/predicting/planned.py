@@ -48,8 +48,7 @@ CLEAR = 0.1
 """Least height of wrist and tool above the plane that the base stands on or hangs from, and distance
 from the base's axis, in reaches: what keeps most postures out of the floor and the arm's column."""
 NEARER = 0.5
-"""Share of the room that the posture of the usual seam has, if that is less than `CLEAR`, and that the
-stations keep: a seam on a wall may lie near the plane that the arm is fixed to."""
+"""Share of the room of the usual seam's posture, if less than `CLEAR`, that stations keep."""
 CANDIDATES = 160
 """Stations to choose from; twice as many make the choice better by per cents."""
 JUDGED = 48

@@ -27,14 +27,12 @@ ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
 SPACING = 0.05
-"""Least distance of the knots of a joint's fine curve [rad or m], and distance beyond what was
-recorded at which nothing is known of it: gears of two arms under a tracker are uneven up to some forty
-times a turn, and what a curve cannot follow is read as wrong zeros and ratios, with which a model is
-millimetres off where a joint was not recorded. Knots at 0.1 foretold five parts of three arms that were
-left out 2.5 times as badly, and knots at 0.025 foretold 26 parts no better."""
+"""Least distance of the knots of a joint's fine curve [rad or m], and distance beyond what was recorded
+at which nothing is known of it. Gears of two arms are uneven up to forty times a turn, and what a curve
+cannot follow is read as wrong zeros and ratios. Knots at 0.1 foretold five parts of three arms that
+were left out 2.5 times as badly, and knots at 0.025 foretold 26 parts no better."""
 KNOTS = 32
-"""Most spacings that a recorded range may take on a joint's fine curve; over a wider range a gear's fine
-error looks less like a slope that it is not, and a coarser curve will do."""
+"""Most spacings of a recorded range on a joint's fine curve; over more a gear's error is no slope."""
 FINE = 7e-5
 """Usual height of the fine curve [rad]: of halves of the recordings of four real arms it was learned as
 0.3, 0.5, 0.7 and 1.0 times 1e-4, RMS of all joints."""

@@ -44,8 +44,7 @@ of their small errors at a usual size, simulated ones hardly any, and either sho
 POOLED, OWN = 3.0, 4.0
 """So many coordinates' worth of belief in that, and in what all families together show, for each."""
 OPEN = 0.05
-"""Part of what a coordinate does in the data that fitted frames do not do, up to which it is hidden: a
-judgement, for noise leaves nothing to be told by a twentieth."""
+"""Part of what a coordinate does that fitted frames do not, up to which it is hidden: a judgement."""
 USUAL = 0.3
 """Size from which on an error is one that machines usually have."""
 SWEEPS, LEARNING = 100, 20

@@ -28,8 +28,7 @@ from .limits import CLEAR, FEW, SAMPLES
 
 SHAPED = 1.0 - 2.0 * FEW
 """Correlation from which a joint's effort has the shape of its load, whatever the masses. A sign is
-told from 0.5 of all joints together: rough masses keep 0.9, chance on some twenty postures stays
-below 0.3."""
+told from 0.5 of all joints: rough masses keep 0.9, chance on twenty postures stays below 0.3."""
 AGREES = 0.02
 """Share of the load's RMS below which effort and statics agree, which is what torque sensors are good
 for; and of the squared difference, that one cause may leave beside what all causes together leave."""

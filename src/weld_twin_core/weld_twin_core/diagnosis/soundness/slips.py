@@ -27,9 +27,8 @@ from .lengths import instant, length
 from .limits import FEW, MARGIN, MOST, TINY
 
 TAKEN_UP = 2.5
-"""A change this many times as large as the largest gaps did not happen: one frame that is fitted takes
-up half of it, base and tool together a little more. A strong shake makes such steps that other columns
-undo."""
+"""Times the largest gaps from which a change did not happen: one frame that is fitted takes up half of
+it, base and tool a little more; a strong shake makes such steps."""
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
 MOVED_BEFORE = np.inf

@@ -28,8 +28,7 @@ from ..algebra.noise_floor import spread_of
 DRAWS = 100
 """Drawings of noise. What none of them reaches noise reaches once in a hundred times."""
 FEW = 400
-"""Rows up to which chance counts: of more, the best of a hundred candidates predicts no twentieth
-part, which is what is asked for."""
+"""Rows up to which chance counts: of more, the best of a hundred predicts no twentieth part."""
 CLEAR = 80.0
 """Rows times logarithm of the fall, from which on nothing is drawn: the best of a hundred groups of ten
 columns reaches a chi-square of 45 once in ten thousand times."""

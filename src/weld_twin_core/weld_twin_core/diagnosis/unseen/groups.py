@@ -33,8 +33,7 @@ from ..algebra.problem import Model, Problem, Scale
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
 """Knots of a curve: enough for two waves of an angle, and few enough for a minute of motion."""
 FINE, LEAST_FINE = 3 * KNOTS['angle'], 400
-"""Knots of a second curve over the angle, for the waves of a gear; and measurements from which it
-is tried: twenty for each knot."""
+"""Knots of a second curve over the angle, for a gear's waves; measurements from which it is tried."""
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
@@ -51,11 +50,9 @@ GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
 """Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
 what takes a tenth of a radian to build up."""
 TURNED = 1e-4
-"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
-have changed flanks by then."""
+"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way."""
 BENT = 4
-"""Knots over the distance from the instrument, and over the angle for each way: straight, bent, and
-bent back."""
+"""Knots over the distance from the instrument, and over the angle for each way: straight or bent."""
 SHARES = (0.02, 0.1, 0.4)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
 NEAR = 1e-3

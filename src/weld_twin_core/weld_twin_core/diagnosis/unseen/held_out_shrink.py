@@ -28,8 +28,7 @@ STUDENT = 2.36
 FEWEST = 3
 """Folds from which on they show a spread at all."""
 STRAYS, MANY_FOR_ONE = 3, 20
-"""Readings that may be left out of held-out stations, three at most and one in twenty: where one
-in a hundred strays, 70 stations have two or more in one recording of six."""
+"""Readings that may be left out of held-out stations, at most, and one in how many."""
 
 
 def held_out_shrink(

@@ -11,7 +11,6 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.cameras.sightings import Fitted
-from weld_twin_core.diagnosis.soundness.base_change import rest_of
 from weld_twin_core.diagnosis.soundness.computed import _gap
 from weld_twin_core.diagnosis.soundness.efforts import efforts, with_sign
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
@@ -27,7 +26,7 @@ from weld_twin_core.diagnosis.soundness.richness import (
     refuse_reused,
     repeats,
 )
-from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
+from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes, rest_of
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, clocks, written
 from weld_twin_core.diagnosis.soundness.stuck import _inside

@@ -13,7 +13,6 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness import mixups as mix_ups
-from weld_twin_core.diagnosis.soundness.base_change import _of_strays, _scale, rest_of
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
 from weld_twin_core.diagnosis.soundness.evidence import Case, mistake
 from weld_twin_core.diagnosis.soundness.gate import examine
@@ -21,7 +20,14 @@ from weld_twin_core.diagnosis.soundness.images import _farther, _larger
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
 from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
-from weld_twin_core.diagnosis.soundness.slips import Slip, _simplest, changes
+from weld_twin_core.diagnosis.soundness.slips import (
+    Slip,
+    _of_strays,
+    _scale,
+    _simplest,
+    changes,
+    rest_of,
+)
 from weld_twin_core.diagnosis.soundness.snapshot import Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import streams
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions

@@ -55,18 +55,11 @@ def directions(robot: Robot, result: Sequence[Effect]) -> tuple[Effect, ...]:
                 wave = reduce(_joined, here, _none_yet(kind, joint))
                 out += [wave.search.with_orders(ORDERS), *_finer(wave)]
     for effect in result:
-        if (
-            effect.traits.waves is None
-            and _counts(effect)
-            and effect.key not in {e.key for e in out}
-        ):
+        # All but how one set-up moved goes along to other motions.
+        counts = effect.traits.cause or not effect.traits.of_setup
+        if effect.traits.waves is None and counts and effect.key not in {e.key for e in out}:
             out.append(effect)
     return tuple(e for e in out if e.fit.coordinates().size)
-
-
-def _counts(effect: Effect) -> bool:
-    """Return whether an effect goes along to other motions: all but how one set-up moved."""
-    return effect.traits.cause or not effect.traits.of_setup
 
 
 def _none_yet(kind: type[Effect], joint: str | None) -> Effect:

@@ -16,12 +16,11 @@ from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
 from ..result import Unsound
-from .base_change import Rest, rest_of
 from .lag import Lag, lag
 from .lengths import distance, middle
 from .limits import ENOUGH, FAR, FEW, HALVED, ROWS, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
-from .slips import Settling, Slip, changes
+from .slips import Rest, Settling, Slip, changes, rest_of
 from .snapshot import Snapshot, snapshot
 
 

@@ -15,7 +15,6 @@ from itertools import combinations
 
 import numpy as np
 
-from ...arrays import Array
 from ...bundle import adjusted
 from ...cameras import Sightings
 from ...cameras.located import located
@@ -142,15 +141,16 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     span = span_of(frames)
     remaining = outside(remaining[None], span)[0]
     explanations: list[tuple[float, float, str]] = []
-    for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
-        each = [columns(r.images, r.seen.position) for r in problem.recordings]
+    every = [r.images for r in problem.recordings if r.images is not None]
+    axes = {'target_scale': np.ones(3)}
+    if all(len(one.cameras) == 1 and one.cameras[0].mount == 'world' for one in every):
+        # Along the line of sight of the only camera, where it stands still.
+        axes['intrinsics'] = np.array([0.0, 0.0, 1.0])
+    for kind, axis in axes.items() if len(every) == len(problem.recordings) else ():
+        each = zip(problem.recordings, problem.rows, problem.samples, strict=True)
         rows = [
-            np.concatenate([part.T, np.zeros((c - 3, len(part)))])
-            for part, c in zip(each, problem.rows, strict=True)
-            if part is not None
+            np.concatenate([(r.seen.position * axis).T, np.zeros((c - 3, m))]) for r, c, m in each
         ]
-        if len(rows) < len(each):
-            continue
         column = outside(problem.whitened(rows, scale)[None], span)[0]
         size = float(column @ column)
         share = float(column @ remaining) / size
@@ -158,17 +158,6 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     explained, share, kind = max(explanations, default=(0.0, 0.0, ''))
     if abs(share) > TARGET_SCALE and HALVED * explained > 1.0:
         yield _too_large(case, kind, share)
-
-
-def _larger(seen: Sightings | None, position: Array) -> Array | None:
-    return None if seen is None else position
-
-
-def _farther(seen: Sightings | None, position: Array) -> Array | None:
-    """Return the way along the line of sight of the only camera, where it stands still."""
-    if seen is None or len(seen.cameras) > 1 or seen.cameras[0].mount != 'world':
-        return None
-    return position * [0.0, 0.0, 1.0]
 
 
 def _too_large(case: Case, kind: str, share: float) -> Finding:

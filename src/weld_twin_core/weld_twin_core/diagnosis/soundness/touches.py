@@ -23,9 +23,8 @@ from ...recording import Recording
 from ..algebra.fit import robust_fit
 from ..algebra.independent_rows import robust_spread
 from ..algebra.motions import plain_causes
-from ..algebra.places import FEWEST
 from ..algebra.problem import Model, Problem
-from ..frames.aligned import aligned
+from ..frames.aligned import FEWEST, aligned
 from ..result import Unsound
 from .evidence import Finding, mistake
 from .limits import CLEAR, FEW, LARGE, ROWS, RUN, STRAY, TINY, UNDONE, WORTH

@@ -221,7 +221,9 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
     if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
         yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
-        weighed = [(maker, _torque(maker)) for maker in features]
+        views = (maker.view for maker in features)
+        torques = (payload_torque(v.robot, v.frames, 1.0, np.zeros(3)) for v in views)
+        weighed = list(zip(features, torques, strict=True))
         # Every joint bent by a mass at the tool; and what that does through the springs that are known.
         bent = [np.array([m.column(('q', i)) * t for i, t in enumerate(ts)]) for m, ts in weighed]
         yield 'load', 'load', bent, ()
@@ -332,12 +334,6 @@ def _sighted(maker: Features, knots: tuple[float, ...] | None) -> Array:
     out = np.zeros((1, 6, maker.at.size))
     out[0, :3] = maker.run.poses.position.T
     return out if knots is None else out * basis(knots, _distance(maker))[:, None]
-
-
-def _torque(maker: Features) -> Array:
-    """Return what a mass at the tool weighs on every joint, (n, M)."""
-    view = maker.view
-    return payload_torque(view.robot, view.frames, 1.0, np.zeros(3))
 
 
 def _grown(maker: Features) -> Array:

@@ -15,10 +15,10 @@ from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
 from ..algebra.definite import EMPTY
 from ..algebra.fit import fit, robust_scale, trusted
-from ..algebra.places import by_place, posed
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
 from ..evidence import Search
+from ..frames.aligned import by_place, posed
 from ..result import Shrink
 from .folds import STRETCHES, jackknife, posture_regions
 from .unseen_stretches import Unseen

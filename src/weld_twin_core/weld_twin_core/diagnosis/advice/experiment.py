@@ -207,10 +207,7 @@ def _name(effect: Effect, others: Sequence[Effect]) -> str:
 
 
 def _entry(
-    plan: Plan,
-    reason: str,
-    model: Model,
-    between: list[list[dict[str, str | None]]] | None = None,
+    plan: Plan, reason: str, model: Model, between: list[list[dict[str, str | None]]] | None = None
 ) -> dict[str, Any]:
     option = plan.candidate
     joints = plan.motion()

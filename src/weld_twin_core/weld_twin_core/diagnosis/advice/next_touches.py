@@ -273,10 +273,7 @@ _MOVING = 10.0
 
 
 def next_touches(
-    problem: Problem,
-    model: Model,
-    alternatives: Sequence[tuple[Effect, ...]],
-    scale: Scale,
+    problem: Problem, model: Model, alternatives: Sequence[tuple[Effect, ...]], scale: Scale
 ) -> dict[str, Any] | None:
     """
     Return the touches to make next, as plain numbers and strings; None where none can be reached.

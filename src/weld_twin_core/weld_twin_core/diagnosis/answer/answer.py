@@ -109,10 +109,7 @@ def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
 
 
 def _parted(
-    unseen: Unseen,
-    claims: tuple[Cause, ...],
-    shares: Shares,
-    verdict: Verdict,
+    unseen: Unseen, claims: tuple[Cause, ...], shares: Shares, verdict: Verdict
 ) -> dict[str, Any]:
     """Return what the levels of an answer say; what each cause adds, where the model stands for it."""
     return {
@@ -220,11 +217,7 @@ def _position_rms(result: Search, alternative: Alternative) -> float:
 
 
 def _unexplained(
-    beliefs: Beliefs,
-    evidence: Evidence,
-    verdict: Verdict,
-    shrink: Shrink,
-    placing: FreeForm,
+    beliefs: Beliefs, evidence: Evidence, verdict: Verdict, shrink: Shrink, placing: FreeForm
 ) -> Unexplained:
     """Return what remains after the verdict, and what that, or an unknown gap itself, depends on."""
     case = Left(evidence, beliefs)

@@ -40,11 +40,7 @@ _LEAST_SHARE = 1e-3
 
 
 def named_effects(
-    result: Search,
-    unseen: Unseen,
-    verdict: Verdict,
-    causes: Sequence[Cause],
-    posterior: Posterior,
+    result: Search, unseen: Unseen, verdict: Verdict, causes: Sequence[Cause], posterior: Posterior
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
     """Return the reported effects, those that move the tool most first, with verdict and causes."""
     model = result.final.model

@@ -50,10 +50,7 @@ _Explanation = tuple[Effect, ...]
 
 
 def next_step(
-    result: Search,
-    verdict: Verdict,
-    limits: Limits,
-    alternative: Curved | None,
+    result: Search, verdict: Verdict, limits: Limits, alternative: Curved | None
 ) -> dict[str, Any] | None:
     """Return the next experiment as `next_experiment` does, None when the question is closed."""
     if result.problem.untracked:

@@ -92,10 +92,7 @@ def by_place(recording: Recording) -> list[Recording]:
 
 
 def posed(
-    tracked: Sequence[Recording],
-    touched: Sequence[Recording],
-    model: Model,
-    align: frozenset[str],
+    tracked: Sequence[Recording], touched: Sequence[Recording], model: Model, align: frozenset[str]
 ) -> Problem:
     """Return the problem of what was measured and of places touched (`by_place`), at a model."""
     filled = [_filled(part, model, k) for k, part in enumerate(touched, len(tracked))]

@@ -30,10 +30,7 @@ class _Step(NamedTuple):
 
 
 def forward(
-    work: Workspace,
-    now: Fit,
-    most: int,
-    tick: Callable[[str], None] = lambda text: None,
+    work: Workspace, now: Fit, most: int, tick: Callable[[str], None] = lambda text: None
 ) -> tuple[Fit, list[Effect]]:
     """
     Return the fit of a forward selection, and what no machine has and would have explained the rest.

@@ -86,12 +86,7 @@ neighbours in time, though not a minute later."""
 
 
 def free_form(
-    problem: Problem,
-    scale: Scale,
-    bare: Fit,
-    beliefs: Beliefs,
-    *,
-    wandering: bool = False,
+    problem: Problem, scale: Scale, bare: Fit, beliefs: Beliefs, *, wandering: bool = False
 ) -> FreeForm:
     """
     Return the few groups that explain what a fit leaves, each with its alternatives.

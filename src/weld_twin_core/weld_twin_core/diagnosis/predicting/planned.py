@@ -147,11 +147,7 @@ def plan_more(
 
 
 def _planned(
-    posterior: Posterior,
-    twin: Twin,
-    region: tuple[Array, Array],
-    count: int,
-    given: Wanted,
+    posterior: Posterior, twin: Twin, region: tuple[Array, Array], count: int, given: Wanted
 ) -> MeasurementPlan:
     anywhere = postures_within_limits(twin.robot, JUDGED)
     still = posterior.at_rest(twin, np.concatenate([*region, anywhere]))

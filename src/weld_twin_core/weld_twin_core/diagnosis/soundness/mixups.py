@@ -25,18 +25,7 @@ from ...effects.joint_compliance import JointCompliance
 from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
 from .lengths import falls, length, listed
-from .limits import (
-    CLEAR,
-    FEW,
-    HALVED,
-    LARGE,
-    MOST,
-    SHORTLIST,
-    UNDONE,
-    UNEXPLAINED,
-    WIDER,
-    WORTH,
-)
+from .limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .mending import frames_fitted
 from .snapshot import LENGTHS, Arm, Snapshot, of_joints, rough_models
 from .suspicions import doubles, robots, suspicions, turned_bases

@@ -40,14 +40,12 @@ def learned_precision(
     believed: Array | None = None,
 ) -> tuple[Array, float]:
     """
-    Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
-
-    The freedom counts the coordinates that the data determine rather than the prior.
+    Return the prior precision (K,) that maximises the evidence, and the freedom that data determine.
 
     normal, right, rss, rows: normal equations with the nuisance frames projected out.
     labels, scales: as `groups` returns them, shape (K,).
-    believed: precision of machines at large, shape (K,): the spread learned starts there and is
-    never wider, and what is fitted freely has it. Nothing is believed when left out.
+    believed: precision of machines at large, (K,), if any: the spread learned starts there and is
+    never wider, and what is fitted freely has it.
     """
     if not scales.size:
         return np.zeros(0), 0.0

@@ -198,8 +198,7 @@ class Problem:
         """
         Return the weight of every sample that was given with the data, shape (M,) per recording.
 
-        Of contacts whose uncertainty is known, in shares of the surest; one for all others. Where
-        recordings are differently sure, less for those that are not.
+        Of contacts and recordings that are differently sure, in shares of the surest; else one.
         """
         sigmas = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
         least = min((float(sigma.min()) for sigma in sigmas if sigma is not None), default=0.0)
@@ -393,9 +392,7 @@ class Problem:
 
 def usable(recording: Recording) -> Recording:
     """
-    Return the recording with the measurements that lie inside its joint stream.
-
-    Its side signals are straight between samples, whatever a running twin makes of them.
+    Return the recording with measurements inside its joint stream, side signals straight between.
 
     Raises DataError: nothing was measured, or no measurement falls inside the joint stream.
     """

@@ -126,9 +126,6 @@ def grown(
 
     Columns enter one at a time, the one that explains most first, as long as the evidence
     grows; all together where that is worth more. Up to ``least`` it does not matter which.
-
-    rss: sum of squares of the residual.
-    effective: number of independent rows.
     """
     diagonal, eye = np.einsum('sii->si', alike.normal), np.eye(alike.right.shape[1])
     live = diagonal > FLAT * alike.size
@@ -241,9 +238,7 @@ def ranking(
     """
     Return every unit's best choice worth more than ``least``, most evidence first.
 
-    systems: normal equations of all seeds, with the model projected out.
-    effective: number of independent rows.
-    roles: which units are asked.
+    systems: normal equations of all seeds, with the model projected out, of some independent rows.
     open_to: which seeds may be chosen, counted over the units in order, shape (S,); all by default.
     """
     each = [grown(alike, systems.rss, effective, least) for alike in systems.alike]

@@ -90,8 +90,7 @@ def standard_errors(
 
     Parameters that are not fitted, that rest on a bound or that the data do not show have none.
 
-    precision: of the prior of all fit coordinates, about zero, shape (K,).
-    share: of the rows that count as independent.
+    precision, share: prior of all fit coordinates, (K,), and of the rows that are independent.
     posterior: the models that the recordings allow; without, the one that was fitted alone counts.
     sets: effects of which one is at work or another: an error holds if it is this one.
     """

@@ -49,14 +49,13 @@ def aligned(
     Return the recordings as a problem, and the model that a search starts from.
 
     recordings: what an instrument measured comes first in the problem, contacts after it.
-    align: frames fitted as nuisance in every hypothesis. Of contacts 'tool' where the tool point is
-    not known; 'base' where it is not known where the base stands, which says nothing where all
-    places are unknown too.
-    known: put into the twin first.
+    align: fitted in every hypothesis. Of contacts 'tool' where the tool point is not known; 'base'
+    where
+    it is not known where it stands, which says nothing where all places are unknown too.
     given: of which of the recordings given each is a part; each by itself when left out.
 
-    Raises DataError: nothing was measured, no measurement falls inside a joint stream, or contacts
-    are too few. Raises ModelError: ``align`` names something else than base and tool.
+    Raises DataError: nothing, or nothing inside a joint stream, was measured, or contacts are too few.
+    Raises ModelError: ``align`` names something else than base and tool.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     align = frames_named(align)

@@ -234,10 +234,8 @@ def in_turn(
     """
     Return the base frames, each (T, 4, 4), and the tools, (T, 4, 4), of the least median gaps.
 
-    tracks: one for every recording; its arrays begin with the axis of trials.
     bases: where the base of every recording is believed to be, shape (T, 4, 4).
-    turn: rotation of the tool, which stays as it is, shape (T, 3, 3).
-    vectors: tool vectors to start from, shape (T, S, 3) [m].
+    turn, vectors: of the tool, (T, 3, 3), which stays, and to start from, (T, S, 3) [m].
     """
     result = _started(bases, vectors)
     for _ in range(ROUNDS):

@@ -141,9 +141,8 @@ def backward(work: Workspace, now: Fit) -> Fit:
     """
     Return the fit with every effect dropped that is not needed given the others, the least first.
 
-    None is needed that is not worth its freedom; nor one far below the noise beside a larger one.
-    Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
-    difference between that cause and its model.
+    None is needed that is not worth its freedom, nor one far below the noise beside a larger one:
+    of thousands of rows a micrometre is significant, but more likely that one's misfit.
     """
     beliefs = work.beliefs
     while now.model.found:

@@ -238,10 +238,9 @@ def alternative_weights(
     """
     Return each group with its weight in the place of member k, the weights adding up to one.
 
-    A group that leaves as much on unseen folds weighs as much; one that leaves r times the squared
-    error weighs r to the power of -rows
-    4: the likelihood of so many independent rows, softened
-    by two because real physics is a little richer than any group.
+    One that leaves r times the squared error on unseen folds weighs r to the power of -rows
+    4: the
+    likelihood of so many rows, softened by two as real physics is a little richer than any group.
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))

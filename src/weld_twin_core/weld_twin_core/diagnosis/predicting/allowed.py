@@ -79,7 +79,6 @@ def allowed(
     Return the models that the recordings allow, about one fitted to all measurements.
 
     precision: prior of the found effects' coordinates in that fit, shape (K,); may be empty.
-    floor: what the recordings themselves say of the instrument's noise.
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
     recordings = problem.recordings

@@ -170,11 +170,11 @@ def _ways(covariance: Array, columns: Array) -> Array:
 
 class Rest(NamedTuple):
     """
-    What is left over: per axis at the tool [m], about each axis [rad], in every gear, shape (n,) [rad].
+    What is left over per axis at the tool [m], about each axis [rad], in every gear, (n,) [rad].
 
-    ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
-    on top of that. ``peaks``, shape (K,) [m], is how far each region was off at its worst, beyond
-    chance. ``swings`` [s^2] is how far joints are off for how hard they were just accelerated.
+    ``turns`` (n,) [rad or m] is left in joints that have just turned around, besides; ``peaks`` (K,)
+    [m] is how far each region was off at its worst, beyond chance; ``swings`` [s^2] how far joints are
+    off for how hard they were just accelerated.
     """
 
     position: float

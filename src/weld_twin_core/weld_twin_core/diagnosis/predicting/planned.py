@@ -134,8 +134,6 @@ def plan_more(
     of a plan is the warning of the diagnosis. New stations count in the set-up that was recorded.
 
     region: postures at which it is judged how sure the model is, and those that may be measured.
-
-    Raises DataError: a number means nothing, or there are fewer stations than counted.
     """
     offered = len(region[1])
     if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= offered):

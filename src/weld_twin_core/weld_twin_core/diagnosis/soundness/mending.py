@@ -154,10 +154,8 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     """
     Return what was given with the arm's own stamps of recording k on the measurements' clock.
 
-    The measurements keep their stamps, so that every reported instant is in theirs.
-
-    late: how late its measurements are at the instant ``middle`` on their own clock [s].
-    rate: how much later they get with every second of theirs [s/s].
+    Measurements, and so all that is reported, keep their own: they are ``late`` [s] at ``middle`` [s],
+    and get later by ``rate`` with every second of theirs [s/s].
     """
 
     def moved(t: Array) -> Array:
@@ -240,12 +238,10 @@ def _plain(value: Any) -> Any:
 
 def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0) -> Given:
     """
-    Return what is given after the corrections of a diagnosis, in their order.
+    Return what is given after the corrections of a diagnosis, in order; ModelError if one misfits.
 
     given: one recording of the same source, or none for the robot alone.
     which: which recording of that diagnosis it is: some corrections are of one alone.
-
-    Raises ModelError: a correction does not fit what is given.
     """
     for entry in entries:
         own = dict(entry)

@@ -128,8 +128,7 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     """
     Return how many times wider than a floor what is left of noise on unseen parts is at the most.
 
-    A fit of few stations takes up part of the noise, so that it leaves too little where it was fitted
-    and too much elsewhere. One where there are many rows.
+    A fit of few stations takes up noise, so that it leaves too little there and too much elsewhere.
 
     columns, precision, ways: all that is fitted, (P, rows), (P,); parts of every row, (rows,).
     known: whether the floor is known apart from what the fit leaves.

@@ -216,10 +216,9 @@ def ratio_interval(
     """
     Return RMS after over before and its 95 % interval, by leaving out one fold at a time.
 
-    Jackknife over folds, so that neighbouring samples do not count as independent. Stretches of one
-    motion say little of another motion: how far the ratio is from that on the recordings fitted
-    (``elsewhere``), each fold unseen, is one draw of that spread, and its square is added to the
-    variance.
+    Jackknife over folds, so that neighbouring samples do not count as independent. Of another motion
+    they say little: how far the ratio is from that on the recordings fitted (``elsewhere``), each fold
+    unseen, is one draw of that spread, and its square is added to the variance.
 
     before, after, labels: squared errors on unseen data and their folds, shape (samples,).
     farthest: logarithm of a ratio between the two beyond which it widens the interval no further.

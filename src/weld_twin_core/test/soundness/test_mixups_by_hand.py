@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.soundness import mixups as mix_ups
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
 from weld_twin_core.diagnosis.soundness.evidence import Case, mistake
 from weld_twin_core.diagnosis.soundness.gate import examine
-from weld_twin_core.diagnosis.soundness.images import _farther, _larger
+from weld_twin_core.diagnosis.soundness.images import _too_large_along
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
 from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
@@ -271,14 +271,14 @@ def test_stations_have_no_lag(ur5, still):
 
 
 def test_what_is_seen_too_far_is_so_along_the_sight_of_one_camera_that_stands():
-    position = np.array([[1.0, 2.0, 3.0]])
     stands, rides = SimpleNamespace(mount='world'), SimpleNamespace(mount='flange')
-    along = _farther(SimpleNamespace(cameras=(stands,)), position)
-    np.testing.assert_array_equal(along, [[0.0, 0.0, 3.0]])
-    assert _farther(SimpleNamespace(cameras=(rides,)), position) is None
-    assert _farther(SimpleNamespace(cameras=(stands, stands)), position) is None
-    assert _farther(None, position) is None and _larger(None, position) is None
-    assert _larger(SimpleNamespace(), position) is position
+    one, other, both = (
+        SimpleNamespace(cameras=each) for each in ((stands,), (rides,), (stands, stands))
+    )
+    np.testing.assert_array_equal(_too_large_along([one])['intrinsics'], [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(_too_large_along([both])['target_scale'], np.ones(3))
+    assert all('intrinsics' not in _too_large_along([each]) for each in (other, both))
+    assert not _too_large_along([one, None])
 
 
 @pytest.mark.parametrize(('share', 'mended'), [(0.83, True), (0.77, False)])

@@ -141,12 +141,7 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     span = span_of(frames)
     remaining = outside(remaining[None], span)[0]
     explanations: list[tuple[float, float, str]] = []
-    every = [r.images for r in problem.recordings if r.images is not None]
-    axes = {'target_scale': np.ones(3)}
-    if all(len(one.cameras) == 1 and one.cameras[0].mount == 'world' for one in every):
-        # Along the line of sight of the only camera, where it stands still.
-        axes['intrinsics'] = np.array([0.0, 0.0, 1.0])
-    for kind, axis in axes.items() if len(every) == len(problem.recordings) else ():
+    for kind, axis in _too_large_along([r.images for r in problem.recordings]).items():
         each = zip(problem.recordings, problem.rows, problem.samples, strict=True)
         rows = [
             np.concatenate([(r.seen.position * axis).T, np.zeros((c - 3, m))]) for r, c, m in each
@@ -158,6 +153,16 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     explained, share, kind = max(explanations, default=(0.0, 0.0, ''))
     if abs(share) > TARGET_SCALE and HALVED * explained > 1.0:
         yield _too_large(case, kind, share)
+
+
+def _too_large_along(images: Sequence[Sightings | None]) -> dict[str, Array]:
+    """Return what of a position may be too large: all, or the sight of one camera that stands."""
+    every = [seen.cameras for seen in images if seen is not None]
+    if len(every) < len(images):
+        return {}
+    alone = all(len(cameras) == 1 and cameras[0].mount == 'world' for cameras in every)
+    sight = {'intrinsics': np.array([0.0, 0.0, 1.0])} if alone else {}
+    return {'target_scale': np.ones(3), **sight}
 
 
 def _too_large(case: Case, kind: str, share: float) -> Finding:

@@ -148,9 +148,8 @@ def planned(
     known = np.array([parting.before.mean() for parting in every])
     # What the data at hand decide already is no question, unless nothing else is left.
     asked = np.flatnonzero((known < SAFE) | (known >= SAFE).all())
-    plan = replace(
-        plan, others=tuple((asked + 1).tolist()), known=known[asked], gains=np.zeros(asked.size)
-    )
+    others = tuple((asked + 1).tolist())
+    plan = replace(plan, others=others, known=known[asked], gains=np.zeros(asked.size))
     # Stations are foreseen one after the other; any other choice of them would come sooner.
     in_turn = option.static and any(e.on in _AS_IT_WORKS for each in alternatives for e in each)
     while more := plan.open(room)[: 1 if in_turn else None]:

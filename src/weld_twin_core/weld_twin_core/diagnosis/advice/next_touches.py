@@ -324,9 +324,8 @@ class _Option(NamedTuple):
     def needed(self, spread: Array) -> int | None:
         """Return how many touches reach most of what more of them can narrow."""
         scatters = np.sqrt([design.open(spread) for design in self.known])
-        enough = np.flatnonzero(
-            scatters[0] - scatters >= _REACHABLE * (scatters[0] - scatters[-1])
-        )
+        narrowed = scatters[0] - scatters
+        enough = np.flatnonzero(narrowed >= _REACHABLE * narrowed[-1])
         return int(enough[0]) if len(self.order) == MOST else None
 
 
@@ -348,9 +347,7 @@ def _unknowns(
 ) -> tuple[list[Effect], set[tuple[str, ...]] | None]:
     """Return the errors that take part, and the keys of those that explanations differ in."""
     view = problem.features(model)[0].view
-    every = {
-        effect.key: effect for effect in plain_causes(model.robot, view, ('constant', 'load'))
-    }
+    every = {e.key: e for e in plain_causes(model.robot, view, ('constant', 'load'))}
     for effects in (*alternatives, model.found):
         every |= {effect.key: effect for effect in effects}
     if len(alternatives) < 2:

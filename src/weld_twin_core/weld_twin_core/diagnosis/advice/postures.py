@@ -153,10 +153,9 @@ class Room:
     def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:
         """Return the motion from stop to stop, (n,), at rest at each, at a share of fastest."""
         robot = self._robot
-        fast = (
-            _FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
-        )
-        hard = _GENTLE * np.where(np.isfinite(robot.max_acceleration), robot.max_acceleration, 5.0)
+        fastest, hardest = robot.max_velocity, robot.max_acceleration
+        fast = _FASTEST * speed * np.where(np.isfinite(fastest), fastest, 1.0)
+        hard = _GENTLE * np.where(np.isfinite(hardest), hardest, 5.0)
         pieces = [np.asarray(stops[0])[None]]
         for start, end in pairwise(stops):
             way = np.abs(end - start)

@@ -165,9 +165,8 @@ def _ahead(
     scale: Scale,
 ) -> Side:
     """Return what the alternatives say of one recording of a candidate."""
-    ahead = with_expected_effort(
-        recording, candidate.model.robot, problem.recordings[0].load_of_effort
-    )
+    load = problem.recordings[0].load_of_effort
+    ahead = with_expected_effort(recording, candidate.model.robot, load)
     made = _measured(candidate.model, ahead, points=max(problem.rows) == 3)
     align = set(problem.align)
     align |= {'base'} if candidate.new_base else set()

@@ -147,10 +147,8 @@ class Columns:
         out = []
         for _, alike in groupby(pieces, key=lambda piece: id(piece.joint)):
             first, *more = alike
-            each = (
-                np.concatenate([first.each, *(one.each for one in more)]) if more else first.each
-            )
-            out.append(Piece(each, first.joint))
+            each = [first.each, *(one.each for one in more)]
+            out.append(Piece(np.concatenate(each) if more else first.each, first.joint))
         return cls(tuple(out))
 
     @cached_property

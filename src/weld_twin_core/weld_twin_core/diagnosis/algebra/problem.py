@@ -114,9 +114,8 @@ class Problem:
         for k, recording in enumerate(self.recordings):
             contacts = recording.contacts
             if contacts is None or contacts.artefact.known:
-                out.setdefault((contacts is None, self.given[k] if self.given else k), []).append(
-                    k
-                )
+                key = contacts is None, self.given[k] if self.given else k
+                out.setdefault(key, []).append(k)
         return tuple(tuple(group) for group in out.values())
 
     @property

@@ -91,9 +91,8 @@ def _prior(effects: list[Effect]) -> Array:
     bent = [k for k, p in sizes if not p.linear and p.lower >= 0.0]
     typical = np.array([effects[0].parameters[k].typical for k in bent])
     values = np.array([effect.vector()[bent] for effect in effects])
-    return np.asarray(
-        -((np.log(np.maximum(values / typical, FLAT)) / USUAL) ** 2).sum(axis=1) / 2.0
-    )
+    off = np.log(np.maximum(values / typical, FLAT)) / USUAL
+    return np.asarray(-(off**2).sum(axis=1) / 2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,10 +164,8 @@ class _Looker:
         for maker in features:
             moved, view = starts[1], _view(maker, effect)
             if maker is not most:
-                shifts = [
-                    np.broadcast_to(e.displace(view)['q', joint], view.t.shape) for e in effects
-                ]
-                moved = np.stack(shifts)
+                shifts = (e.displace(view)['q', joint] for e in effects)
+                moved = np.stack([np.broadcast_to(shift, view.t.shape) for shift in shifts])
             if effect.stage in MEMORY:  # at the stamps of the measurements
                 moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
             parts.append(moved)

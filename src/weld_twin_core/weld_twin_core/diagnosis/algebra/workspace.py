@@ -367,9 +367,8 @@ class Workspace:
 
     def hopeless(self, now: Fit) -> float:
         """Return the sum of squares from which on nothing can take the place of what was found."""
-        with np.errstate(
-            over='ignore'
-        ):  # without noise a handful of rows count, and nothing is hopeless
+        # Without noise a handful of rows count, and nothing is hopeless.
+        with np.errstate(over='ignore'):
             return now.rss * max(float(np.exp(2.0 * FAR / self.effective(now))), FAR_SHARE)
 
     def beside(self, now: Fit) -> SeedSystems:

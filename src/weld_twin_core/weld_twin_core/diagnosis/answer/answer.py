@@ -166,10 +166,9 @@ def _gap(result: Search, floor: float) -> Gap:
     """Return the gap over trusted samples, without frames and known effects; the floor is in m."""
     parts = result.problem.residuals(result.baseline.model)
     good = trusted(result.scale.weights)
-    distance = np.concatenate(
-        [np.linalg.norm(p[:3, g], axis=0) for p, g in zip(parts, good, strict=True)]
-    )
-    turns = [p[3:, g] for p, g in zip(parts, good, strict=True) if p.shape[0] > 3]
+    pairs = list(zip(parts, good, strict=True))
+    distance = np.concatenate([np.linalg.norm(p[:3, g], axis=0) for p, g in pairs])
+    turns = [p[3:, g] for p, g in pairs if p.shape[0] > 3]
     turn = None
     if turns:
         turn = float(np.sqrt(np.mean(np.concatenate([(t**2).sum(axis=0) for t in turns]))))

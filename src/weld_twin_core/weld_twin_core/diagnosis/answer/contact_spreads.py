@@ -94,11 +94,9 @@ def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]
 
 def _held_out(unseen: Unseen) -> dict[str, Array]:
     """Return distances from every contact as predicted where it was not fitted."""
-    parts = unseen.problem.by_sample(unseen.whole)
+    recordings, parts = unseen.problem.recordings, unseen.problem.by_sample(unseen.whole)
     out: dict[str, Array] = {}
-    for recording, part, weight in zip(
-        unseen.problem.recordings, parts, unseen.scale.weights, strict=True
-    ):
+    for recording, part, weight in zip(recordings, parts, unseen.scale.weights, strict=True):
         contacts = recording.contacts
         if contacts is None:
             continue

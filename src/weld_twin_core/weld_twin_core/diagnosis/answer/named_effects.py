@@ -230,13 +230,11 @@ def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Arr
         + missed / result.work.beliefs.misfit_directions
     )
     model = result.final.model
-    spread = covariance(
-        result.problem, model, result.scale, result.precision, 1.0 / (rows * doubt)
-    )
+    share = 1.0 / (rows * doubt)
+    spread = covariance(result.problem, model, result.scale, result.precision, share)
     # A coordinate on a bound, or that the data do not show, stays.
-    spread = np.nan_to_num(spread) + np.diag(
-        np.concatenate([idealised(effect) for effect in model.found]) ** 2
-    )
+    beside = np.concatenate([idealised(effect) for effect in model.found])
+    spread = np.nan_to_num(spread) + np.diag(beside**2)
     variances, ways = np.linalg.eigh(spread)
     unit = rng.standard_normal((_DRAWS, variances.size))
     return np.asarray(unit @ (ways * np.sqrt(np.maximum(variances, 0.0))).T)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from math import erfc, sqrt
 from typing import Any
 
@@ -120,9 +121,8 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     parted = erfc(-beyond / sqrt(2.0)) / 2.0
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
-    named = all(
-        REGISTRY[item['effect']].traits.cause for side in wanted['between'] for item in side
-    )
+    between = chain.from_iterable(wanted['between'])
+    named = all(REGISTRY[each['effect']].traits.cause for each in between)
     believed = verdict.confidence if verdict.sets else 1.0 - verdict.confidence
     return parted * max(believed, 0.0 if named else _EVEN)
 

@@ -82,9 +82,8 @@ def by_place(recording: Recording) -> list[Recording]:
     out = []
     for index in contacts.parts():
         part = contacts.take(index)
-        motion = replace(
-            recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
-        )
+        t, q = recording.joints.t[index], recording.joints.q[index]
+        motion = replace(recording.joints, t=t, q=q, qd=None)
         name = '+'.join(contact.label for contact in part.artefact.contacts)
         out.append(replace(recording, name=name, joints=motion, contacts=part))
     return out

@@ -133,12 +133,11 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
     for _ in range(ROUNDS):
         moment, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
         for track, base, weight in zip(tracks, model.bases, weights, strict=True):
-            turn = base[:3, :3] @ track.turn
+            axes = base[:3, :3]
+            turn = axes @ track.turn
             if track.rotation is not None:
                 moment += np.einsum('m,mki,mkj', weight, turn, track.rotation)
-            left = (
-                track.position - track.point @ base[:3, :3].T - turn @ start[:3, 3] - base[:3, 3]
-            )
+            left = track.position - track.point @ axes.T - turn @ start[:3, 3] - base[:3, 3]
             normal += np.einsum('m,mki,mkj', weight, turn, turn)
             right += np.einsum('m,mki,mk', weight, turn, left)
         tie = max(TIE * np.linalg.norm(moment), ROUNDING)

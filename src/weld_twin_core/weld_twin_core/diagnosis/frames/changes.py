@@ -205,9 +205,8 @@ def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -
     if len(result.problem.recordings) < 2 or not families:
         return result
     before = [_site(change) for change in result.problem.changes]
-    problem, model = with_changes(
-        result.problem, result.final.model, families, beliefs, result.precision
-    )
+    found = result.problem, result.final.model
+    problem, model = with_changes(*found, families, beliefs, result.precision)
     final, scale = robust_fit(problem, model, result.precision, rounds=1)
     result = replace(result, problem=problem, scale=scale, final=final)
     if [_site(change) for change in problem.changes] == before:

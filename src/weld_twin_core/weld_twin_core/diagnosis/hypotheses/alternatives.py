@@ -58,9 +58,8 @@ def fit_alternatives(
 
     out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:
-        out.append(
-            Alternative(choice.unit.site, log_bayes(other, choice), other, role=choice.unit.role)
-        )
+        unit = choice.unit
+        out.append(Alternative(unit.site, log_bayes(other, choice), other, role=unit.role))
     for other_set in others:
         if other_set.instead_of == Part(place):
             # What it has that was not found, what entered first before the others.
@@ -96,9 +95,8 @@ def _weighed(every: Sequence[Alternative], temperature: float) -> CandidateSet:
     log_bayes = np.array([one.log_bayes for one in out.values()])
     weights = np.exp((log_bayes - most) / temperature)
     weights /= weights.sum()
-    weighed = [
-        replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)
-    ]
+    pairs = zip(out.values(), weights.tolist(), strict=True)
+    weighed = (replace(r, probability=w) for r, w in pairs)
     return tuple(sorted(weighed, key=lambda r: -r.probability))
 
 
@@ -124,9 +122,8 @@ def with_leads(
             )
         out.append(candidate_set)
     pairs = zip(out, behind.tolist(), strict=True)
-    return tuple(
-        tuple(replace(one, behind=b) for one in candidate_set) for candidate_set, b in pairs
-    ), refused
+    each = (tuple(replace(one, behind=b) for one in own) for own, b in pairs)
+    return tuple(each), refused
 
 
 def _same_anywhere(now: Fit, effect: Effect, other: Alternative) -> bool:

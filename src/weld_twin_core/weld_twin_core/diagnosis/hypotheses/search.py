@@ -117,10 +117,8 @@ def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[C
         for k, effect in enumerate(now.model.found):
             candidate_sets.append(fit_alternatives(work, now, k, others))
             progress(f'alternatives of {Site.of(effect)} weighed')
-            leader, own = (
-                candidate_sets[-1][0],
-                next(r for r in candidate_sets[-1] if r.fit is now),
-            )
+            leader = candidate_sets[-1][0]
+            own = next(r for r in candidate_sets[-1] if r.fit is now)
             # What was had before comes back only where that is more than rounding.
             most = own.log_bayes + AHEAD * (names(leader.fit.model) in had)
             if leader.log_bayes > most and attempt < SWAPS:
@@ -164,9 +162,8 @@ def borne_out(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
     if len(result.candidate_sets) == len(result.small.model.found):
         result = _exchanged(result, left_on, beliefs)
     candidate_sets = list[CandidateSet]()
-    for effect, candidate_set in zip(
-        result.final.model.found, result.candidate_sets, strict=False
-    ):
+    pairs = zip(result.final.model.found, result.candidate_sets, strict=False)
+    for effect, candidate_set in pairs:
         own = Site.of(effect)
         close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
         certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure

@@ -46,19 +46,14 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     if verdict.status in NAMING or (result.dense and verdict.sets):
         return None
     reported = {site for group in verdict.sets for site in group}
-    kept = [
-        effect
-        for effect, candidate_set in zip(
-            result.final.model.found, result.candidate_sets, strict=False
-        )
-        if {Site.of(effect), candidate_set[0].site} & reported
-    ]
-    of_setup = (e for e in result.final.model.found if not (e.traits.cause or e.traits.bends))
-    kept = [*of_setup, *kept]
-    found = _beside(result, kept, beliefs)
-    if found is None and verdict.status == 'unknown':
-        found = _beside(result, kept, beliefs, wandering=True)
-    return found
+    found = result.final.model.found
+    pairs = zip(found, result.candidate_sets, strict=False)
+    named = [effect for effect, own in pairs if {Site.of(effect), own[0].site} & reported]
+    kept = [*(e for e in found if not (e.traits.cause or e.traits.bends)), *named]
+    out = _beside(result, kept, beliefs)
+    if out is None and verdict.status == 'unknown':
+        out = _beside(result, kept, beliefs, wandering=True)
+    return out
 
 
 def _beside(

@@ -197,9 +197,8 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
 
 def _worst_gain(before: list[Array], after: list[Array]) -> float:
     """Return the share of the squared error that falls, by the way that shows least."""
-    return min(
-        1.0 - float(b.sum() / max(a.sum(), EMPTY)) for a, b in zip(before, after, strict=True)
-    )
+    pairs = zip(before, after, strict=True)
+    return min(1.0 - float(b.sum() / max(a.sum(), EMPTY)) for a, b in pairs)
 
 
 def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Member]:

@@ -124,7 +124,6 @@ def _shared_out(normal: Array, right: Array) -> Array:
 
 def _errors(normal: Array, right: Array) -> Array:
     whole, pulls = normal.sum(axis=0), right.sum(axis=0)
-    tries = np.array(
-        [_shared_out(whole - a, pulls - b) for a, b in zip(normal, right, strict=True)]
-    )
+    folds = zip(normal, right, strict=True)
+    tries = np.array([_shared_out(whole - a, pulls - b) for a, b in folds])
     return np.asarray(np.sqrt(jackknife(tries)))

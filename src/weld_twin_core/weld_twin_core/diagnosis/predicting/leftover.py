@@ -380,9 +380,8 @@ def _in_common(problem: Problem, predicted: Predicted) -> float:
         here = np.flatnonzero((predicted.region == region) & predicted.good)
         for size, order, starts in _neighbours(problem, here):
             error, ways = predicted.left[order, :3], predicted.own[:, order, :3]
-            alone = np.stack(
-                [error**2, np.einsum('rki,rki->ki', ways, ways), predicted.seen[order, :3]]
-            )
+            open_ = np.einsum('rki,rki->ki', ways, ways)
+            alone = np.stack([error**2, open_, predicted.seen[order, :3]])
             each = np.add.reduceat(alone, starts, axis=1)
             together = [
                 np.add.reduceat(error, starts) ** 2,
@@ -439,9 +438,8 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
 
     # On the axes in which both are diagonal, every size asked for costs a division.
     root = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(shape, moments.shape)))
-    spread, turn = np.linalg.eigh(
-        root @ (moments + NANOMETRE**2 * np.eye(3)) @ np.swapaxes(root, -1, -2)
-    )
+    whole = moments + NANOMETRE**2 * np.eye(3)
+    spread, turn = np.linalg.eigh(root @ whole @ np.swapaxes(root, -1, -2))
     along = (np.swapaxes(turn, -1, -2) @ (root @ errors[..., None]))[..., 0] ** 2
     # Axes first: a sum over three neighbours in memory takes longer than all divisions.
     along, spread = np.ascontiguousarray(along.T), np.ascontiguousarray(spread.T)

@@ -133,9 +133,8 @@ def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
     doubled = np.ceil(np.log2(np.maximum(high - low, SPACING) / (SPACING * KNOTS)))
     steps = SPACING * 2.0 ** np.maximum(doubled, 0.0)
     first, last = np.floor(low / steps), np.floor(high / steps) + 1.0
-    return tuple(
-        step * np.arange(a, b + 1.0) for step, a, b in zip(steps, first, last, strict=True)
-    )
+    each = zip(steps, first, last, strict=True)
+    return tuple(step * np.arange(a, b + 1.0) for step, a, b in each)
 
 
 def discrepancy(

@@ -191,9 +191,8 @@ def _of_links(robot: Robot, chain: Frames) -> Array:
     """Return what each link weighs on the joints, shape (n, n, N): link, joint, sample."""
     assert robot.mass is not None
     each = np.diag(robot.mass)
-    return np.array(
-        [chain_gravity_torque(replace(robot, mass=m, payload_mass=0.0), chain) for m in each]
-    )
+    arms = (replace(robot, mass=m, payload_mass=0.0) for m in each)
+    return np.array([chain_gravity_torque(arm, chain) for arm in arms])
 
 
 def _factors(loads: _Loads, size: Array) -> dict[int, float]:

@@ -89,7 +89,7 @@ class Examined:
             return self
         remaining = Case(problem, model).slips
         kept = [
-            slip for slip in self.slips if any(_same(slip, other, problem) for other in remaining)
+            one for one in self.slips if any(_same(one, other, problem) for other in remaining)
         ]
         if not kept:
             return self

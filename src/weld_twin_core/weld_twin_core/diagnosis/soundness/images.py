@@ -15,6 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ...arrays import Array
 from ...bundle import adjusted
 from ...cameras import Sightings
 from ...cameras.located import located

@@ -72,10 +72,8 @@ def _along(path: Array, joints: Array, t: Array) -> Array:
 def _nearest(lags: Array, costs: Array) -> float:
     """Return the smallest lag among the best minima; a periodic motion has many."""
     padded = np.pad(costs, 1, constant_values=np.inf)
-    lowest = (
-        (costs <= padded[:-2]) & (costs <= padded[2:]) & (costs <= (1.0 + 2.0 * FEW) * costs.min())
-    )
-    good = lags[lowest]
+    low = costs <= (1.0 + 2.0 * FEW) * costs.min()
+    good = lags[low & (costs <= padded[:-2]) & (costs <= padded[2:])]
     return float(good[np.abs(good).argmin()])
 
 

@@ -129,10 +129,8 @@ def poses_inverted(given: Given) -> Given:
 
 def robot_as(given: Given, name: str) -> Given:
     """Return what was given with a bundled robot that stands where the first did, same tool."""
-    other = catalog.load(name).with_frames(
-        base=given.robot.T_world_base, tool=given.robot.T_flange_tool
-    )
-    return replace(given, robot=other)
+    base, tool = given.robot.T_world_base, given.robot.T_flange_tool
+    return replace(given, robot=catalog.load(name).with_frames(base=base, tool=tool))
 
 
 def differing(given: Given, families: tuple[str, ...]) -> Given:

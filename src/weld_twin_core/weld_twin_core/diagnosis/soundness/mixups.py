@@ -268,19 +268,16 @@ def _other_links(shot: Snapshot) -> Finding | None:
     if remaining < LARGE:
         return None
     errors = of_joints(shot.robot, (*own, LinkLength, LinkOffset))
-    lengths = np.repeat(
-        [e.name in LENGTHS for e in errors], [e.fit.coordinates().size for e in errors]
-    )
+    sizes = [e.fit.coordinates().size for e in errors]
+    lengths = np.repeat([e.name in LENGTHS for e in errors], sizes)
     for wider in (WIDER, WIDER**3):  # within a family, and of an arm of another size
         arm = shot.bent(errors, np.where(lengths, wider, 1.0), LARGE)
         after = shot.gap(arm)
         if HALVED * after < remaining:
             if _moved(shot, arm) <= UNDONE:
                 return None
-            worst = max(
-                (e for e in arm.found if e.name in LENGTHS),
-                key=lambda e: abs(float(e.vector()[0])),
-            )
+            links = (e for e in arm.found if e.name in LENGTHS)
+            worst = max(links, key=lambda e: abs(float(e.vector()[0])))
             why = f'; with other lengths {falls(remaining, after)}'
             return _foreign(arm.robot, worst, why)
     return None

@@ -68,9 +68,8 @@ def _one_way(case: Case) -> Iterator[Finding]:
     for q in case.motions:
         travel = np.abs(np.diff(q, axis=0)).sum(axis=0)
         turned |= (travel < MOVED) | (travel - np.abs(q[-1] - q[0]) > MOVED)
-    names = [
-        repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True) if not t
-    ]
+    pairs = zip(case.model.robot.joint_names, turned, strict=True)
+    names = [repr(name) for name, there in pairs if not there]
     if names:
         yield note(
             f'{listed(names)} never reverse{"s" if len(names) == 1 else ""}; '

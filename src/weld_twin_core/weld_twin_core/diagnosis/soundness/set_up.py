@@ -126,9 +126,8 @@ def _words(case: Case, own: Arm) -> str:
     # A turn counts by what it does at the reach of a torch.
     sizes = {k: way + TORCH * turn for k, (way, turn) in far.items()}
     worst = max(sizes, key=lambda k: sizes[k])
-    names = [
-        case.recordings[k].name for k, size in sizes.items() if size > 2.0 * FEW * sizes[worst]
-    ]
+    least = 2.0 * FEW * sizes[worst]
+    names = [case.recordings[k].name for k, size in sizes.items() if size > least]
     way, turn = far[worst]
     angle = f' and turned by {_angle(turn)}' if turn > PARTED else ''
     most = f', {case.recordings[worst].name} most' if len(names) > 1 else ''

@@ -219,9 +219,8 @@ def _of_arm(problem: Problem, model: Model, features: list[Features]) -> list[Ar
     for effect in (*plain_causes(model.robot, view, LASTING), MeasurementScale()):
         size = WIDER * spreads(model.robot, effect)
         known = np.isfinite(size)
-        for own, part in zip(
-            out, problem.effect_columns(features, effect, atoms=False), strict=True
-        ):
+        columns = problem.effect_columns(features, effect, atoms=False)
+        for own, part in zip(out, columns, strict=True):
             own.append(part[known] * size[known, None, None])
     return [np.concatenate(own) for own in out]
 

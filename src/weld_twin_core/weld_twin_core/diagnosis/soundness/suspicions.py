@@ -112,11 +112,9 @@ def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, ...], str, str, Arr
     """Yield kind, place, words, remedy and matrix of what columns of joints may be instead."""
     names, turning, n = robot.joint_names, ~robot.prismatic, robot.n
     for factor, words in _ANGLES:
-        remedy, every = (
-            'Record or import the joint positions in radians',
-            np.where(turning, factor, 1.0),
-        )
-        yield 'units', names, f'joint positions are {words}', remedy, np.diag(every)
+        remedy = 'Record or import the joint positions in radians'
+        every = np.diag(np.where(turning, factor, 1.0))
+        yield 'units', names, f'joint positions are {words}', remedy, every
     for i, name in enumerate(names):
         remedy = f'Give {name} in the unit of the others'
         for factor, words in _ANGLES if turning[i] else _LENGTHS:
@@ -127,10 +125,8 @@ def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, ...], str, str, Arr
             apart = _with(np.where(turning, 1.0 / DEGREE, 1.0), i, 1.0)
             yield 'units', (name,), words, remedy, np.diag(apart)
     for i, name in enumerate(names):
-        words, turned = (
-            f'joint {name!r} counts the other way round',
-            _with(np.eye(n), (i, i), -1.0),
-        )
+        words = f'joint {name!r} counts the other way round'
+        turned = _with(np.eye(n), (i, i), -1.0)
         yield 'sign', (name,), words, f'Turn the sign of {name}', turned
     yield 'sign', names, 'all joints count the other way round', 'Turn every sign', -np.eye(n)
     for at, words, order in _orders(names):
@@ -182,10 +178,8 @@ def _positions() -> Iterator[tuple[str, str, str, Array]]:
         remedy = 'Record or import positions in metres'
         yield 'units', f'measured positions are {words}', remedy, np.full(3, factor)
     for k, axis in enumerate(AXES):
-        what, remedy = (
-            f'{axis} of the measured positions is',
-            f'Give {axis} in the unit of the others',
-        )
+        what = f'{axis} of the measured positions is'
+        remedy = f'Give {axis} in the unit of the others'
         for factor, words in _LENGTHS:
             yield 'units', f'{what} {words}', remedy, _with(np.ones(3), k, factor)
         apart = _with(np.full(3, 1.0 / MILLIMETRE), k, 1.0)

@@ -156,17 +156,16 @@ class _Postures:
                 continue
             self._keep[index[rows]] = False
             several = len(rows) > 1
-            which = f'Posture{"s" if several else ""} {", ".join(str(k + 1) for k in rows)}'
+            numbers = ', '.join(str(k + 1) for k in rows)
+            which = f'Posture{"s" if several else ""} {numbers} of {label!r}'
             off = f'{float(away[rows].max()) * 1e3:.1f} mm'
             if name:
                 rest = f'rest{"" if several else "s"} in {name!r}, {off} away.'
-                yield _mended(
-                    (label, name), f'{which} of {label!r} {rest}', f'Label them {name!r}'
-                )
+                yield _mended((label, name), f'{which} {rest}', f'Label them {name!r}')
             else:
                 lie = f'{"are up to" if several else "is"} {off} off: the contact slipped.'
                 again = 'Touch again in these postures'
-                yield _mended((label,), f'{which} of {label!r} {lie}', again)
+                yield _mended((label,), f'{which} {lie}', again)
 
     def _moved(self, label: str, index: NDArray[np.int_], usual: float) -> Iterator[Unsound]:
         """Give postures in a row that rest together elsewhere a contact of their own."""
@@ -191,9 +190,8 @@ class _Postures:
         """Return the recording with the postures that count, under the labels they have now."""
         given, labels, artefact = self._given, self._labels, self._contacts.artefact
         counted = [label for label, kept in zip(labels, self._keep, strict=True) if kept]
-        index = [
-            k for k in np.flatnonzero(self._keep).tolist() if counted.count(labels[k]) >= FEWEST
-        ]
+        kept = np.flatnonzero(self._keep).tolist()
+        index = [k for k in kept if counted.count(labels[k]) >= FEWEST]
         known = {contact.label for contact in artefact.contacts}
         new = dict.fromkeys(labels[k] for k in index if labels[k] not in known)
         artefact = Artefact((*artefact.contacts, *map(Contact, new)), artefact.ties)

@@ -66,9 +66,7 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
     ways = [_parts(rest, remaining, labels) for labels in candidates.ways]
     best = 0.0
     for group in candidates.groups:
-        each = [
-            _shares(parts, group, rest, remaining, candidates.ridges, steady) for parts in ways
-        ]
+        each = [_shares(own, group, rest, remaining, candidates.ridges, steady) for own in ways]
         best = max(best, float((np.mean if pooled else np.min)(each, axis=0).max()))
     return best
 

@@ -90,9 +90,8 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     names = np.intersect1d(labels, others)
     one, two = means(before, labels)[names], means(after, others)[names]
     was, remaining = float(before.mean()), float(after.mean())
-    return Gain(
-        (was - remaining) / max(was, EMPTY), steadiness(one, two), float(np.sqrt(remaining))
-    )
+    share = (was - remaining) / max(was, EMPTY)
+    return Gain(share, steadiness(one, two), float(np.sqrt(remaining)))
 
 
 def means(values: Array, labels: NDArray[Any]) -> Array:

@@ -128,9 +128,8 @@ def _spanned(
 def _curved(features: list[Features], model: Model) -> Iterator[tuple[str, str, list[Effect]]]:
     static = all(maker.run.view.static for maker in features)
     for index, joint in enumerate(model.robot.joint_names):
-        fixed = [
-            JointCurve(joint, (0.0,), (0.0,), 'constant', channel) for channel in ('q', *OFF_AXIS)
-        ]
+        channels = ('q', *OFF_AXIS)
+        fixed = [JointCurve(joint, (0.0,), (0.0,), 'constant', channel) for channel in channels]
         yield joint, 'constant', list(fixed)
         for on in ('angle', 'direction', 'speed', 'load', 'temperature', 'time'):
             knots = _knots(features, index, on)

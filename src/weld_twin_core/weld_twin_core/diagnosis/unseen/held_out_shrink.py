@@ -145,9 +145,8 @@ def _on_bags(
         problem = Problem((usable(recording),), frozenset({'base'}) & result.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
         for model in (result.baseline.model, result.final.model):
-            parts = problem.residuals(
-                _for_bag(problem, model, result.problem.recordings, other_setup)
-            )
+            own = _for_bag(problem, model, result.problem.recordings, other_setup)
+            parts = problem.residuals(own)
             pair.append((parts[0][:3] ** 2).sum(axis=0))
             # What is an outlier shows best against the better model, which comes last.
             few = min(STRAYS, problem.samples[0] // MANY_FOR_ONE)
@@ -170,9 +169,8 @@ def _on_contacts(result: Search, recording: Recording) -> list[tuple[Array, Arra
     sizes = []
     for fitted in (result.baseline.model, model):
         base = fitted.bases[own[0] if own else 0]
-        same = replace(
-            start, robot=fitted.robot, bases=(base,) * len(start.bases), found=fitted.found
-        )
+        bases = (base,) * len(start.bases)
+        same = replace(start, robot=fitted.robot, bases=bases, found=fitted.found)
         sizes.append([(part**2).sum(axis=0) for part in problem.residuals(same)])
     return list(zip(*sizes, strict=True))
 

@@ -456,7 +456,6 @@ def _spread(normal: Array) -> Array:
 
 def _tether(model: Model) -> Array:
     """Return a weak prior precision, (K,), that keeps what a few stretches cannot show."""
-    sizes = [
-        np.maximum(np.abs(e.fit.coordinates()), e.fit.coordinate_scales()) for e in model.found
-    ]
+    fits = (effect.fit for effect in model.found)
+    sizes = [np.maximum(np.abs(own.coordinates()), own.coordinate_scales()) for own in fits]
     return 1.0 / (TETHER * np.concatenate([np.zeros(0), *sizes])) ** 2

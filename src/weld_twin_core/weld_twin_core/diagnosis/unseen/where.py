@@ -167,9 +167,8 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain][
-        :MOST_DEPENDENCES
-    ]
+    reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain]
+    reliable = reliable[:MOST_DEPENDENCES]
     names = tuple(str(group) for _, group in reliable)
     of_rest = {(group.at, group.on): one.share for one, group in reversed(reliable)}
     chance = 0.0
@@ -177,9 +176,8 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     if counts and may_be_chance(unseen.residual.size, best.share):
         every = all_groups(problem, model, unseen.scale)
         each = (g.columns for g in every if _tells(g, joints, named))
-        tried = Candidates(
-            unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
-        )
+        columns = unseen.columns.written_out()
+        tried = Candidates(columns, unseen.precision, each, RIDGES, [unseen.labels])
         chance = chance_gain(tried, beliefs.blatant_sure)
     return Structure(best.rms_m, best.share, best.steady, names, chance, of_gap, of_rest)
 

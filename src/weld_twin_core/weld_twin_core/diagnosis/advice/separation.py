@@ -105,10 +105,7 @@ def partings(
     now: Side,
 ) -> list[Parting]:
     """Return how a candidate's pieces part the first alternative, believed most, from others."""
-    ahead = [
-        _ahead(problem, candidate, recording, alternatives, scale)
-        for recording in candidate.recordings
-    ]
+    ahead = [_ahead(problem, candidate, r, alternatives, scale) for r in candidate.recordings]
     out = []
     for other in range(1, len(alternatives)):
         parting = Parting([], [])

@@ -57,10 +57,8 @@ def by_sample(
     """Return rows, (rows, ...), as `Problem.whitened` lays them out, by recording, (M, c, ...)."""
     ends = np.cumsum([c * m for c, m in zip(rows, samples, strict=True)])
     parts = np.split(values, ends[:-1])
-    return [
-        part.reshape(m, c, *values.shape[1:])
-        for part, c, m in zip(parts, rows, samples, strict=True)
-    ]
+    each = zip(parts, rows, samples, strict=True)
+    return [part.reshape(m, c, *values.shape[1:]) for part, c, m in each]
 
 
 def robust_spread(values: Array) -> float:

@@ -239,10 +239,8 @@ class Problem:
         for other, makers in self._lately:
             if other is model:
                 return makers
-        makers = [
-            Features(model.twin(k), r, r.seen.t, self._remembered[k])
-            for k, r in enumerate(self.recordings)
-        ]
+        each = zip(self.recordings, self._remembered, strict=True)
+        makers = [Features(model.twin(k), r, r.seen.t, own) for k, (r, own) in enumerate(each)]
         self._lately[1:] = self._lately[:1]
         self._lately[:1] = [(model, makers)]
         return makers

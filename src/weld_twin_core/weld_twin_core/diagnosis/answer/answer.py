@@ -29,7 +29,6 @@ from ..levels.free_form import FreeForm
 from ..result import (
     Candidate,
     Cause,
-    Changed,
     Check,
     Diagnosis,
     Found,
@@ -126,30 +125,21 @@ def _parted(
 
 def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:
     """Return the recordings, what they say of each other, and what no recording can say."""
-    named = examined.given.may_change
+    named, fitted = examined.given.may_change, (result.problem, result.final.model)
     return {
         'efforts': compared(result.problem.recordings, result.baseline.model.robot),
         'recordings': result.problem.recordings,
         'traces': _traces(result),
         'absent': result.library.absent | dict.fromkeys(other_causes(result.problem), NOT_TOLD),
-        'checks': (*examined.checks, *_undetectable_check(result, named)),
-        'changed': _changed(result, named),
+        'checks': (*examined.checks, *_undetectable_check(list_undetectable(*fitted, named))),
+        'changed': list_changes(*fitted, result.scale, result.precision, named),
         'may_change': named,
         'unsound': examined.unsound_with(result.final.model.found),
         'same': never_parted(result.baseline.model.robot, result.work.problem.align, verdict.sets),
     }
 
 
-def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
-    if not families:
-        return ()
-    return list_changes(
-        result.problem, result.final.model, result.scale, result.precision, families
-    )
-
-
-def _undetectable_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
-    names = list_undetectable(result.problem, result.final.model, families)
+def _undetectable_check(names: Sequence[str]) -> tuple[Check, ...]:
     if not names:
         return ()
     return (

@@ -68,12 +68,8 @@ def _named_sets(
     if not dense:
         return [(c.members[0], c.effect) for c in causes if c.effect is not None]
     sites = [Site.of(effect) for effect in model]
-    return [
-        (sites.index(site), k)
-        for k, group in enumerate(verdict.sets)
-        for site in group[:1]
-        if site in sites
-    ]
+    pairs = ((group[0], k) for k, group in enumerate(verdict.sets) if group)
+    return [(sites.index(site), k) for site, k in pairs if site in sites]
 
 
 def standard_errors(
@@ -140,10 +136,8 @@ def _free(model: Model) -> NDArray[np.bool_]:
     out: list[bool] = []
     for effect in model.found:
         specs = [effect.components()[k][0] for k in effect.fit.fitted()]
-        out += [
-            p.lower < value < p.upper
-            for p, value in zip(specs, effect.fit.coordinates(), strict=True)
-        ]
+        pairs = zip(specs, effect.fit.coordinates(), strict=True)
+        out += [p.lower < value < p.upper for p, value in pairs]
     return np.array(out, dtype=bool)
 
 
@@ -225,10 +219,8 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
 def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
     """Return how far coordinates may be off by noise and by what is missed, (DRAWS, K)."""
     rows = result.small.residual.size
-    doubt = (
-        1.0 / max(result.effective(result.small), 1.0)
-        + missed / result.work.beliefs.misfit_directions
-    )
+    missing = missed / result.work.beliefs.misfit_directions
+    doubt = 1.0 / max(result.effective(result.small), 1.0) + missing
     model = result.final.model
     share = 1.0 / (rows * doubt)
     spread = covariance(result.problem, model, result.scale, result.precision, share)

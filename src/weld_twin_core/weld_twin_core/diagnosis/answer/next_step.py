@@ -166,11 +166,8 @@ def _without_names(
     out = [fitted]
     kept = fitted[: len(alternative.kept)]
     for group in _others(alternative.form.parts):
-        curves = [
-            c
-            for p in alternative.form.parts
-            for c in (group if p is parts[0] else p.group).movable_curves
-        ]
+        groups = [group if p is parts[0] else p.group for p in alternative.form.parts]
+        curves = [curve for own in groups for curve in own.movable_curves]
         out.append(_fitted(alternative.found, (*kept, *curves)))
     return [tuple(extended(effect, ends) for effect in effects) for effects in out]
 

@@ -227,6 +227,8 @@ def list_changes(
     problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
 ) -> tuple[Changed, ...]:
     """Return what differs between recordings beyond noise; frames fitted for each are compared here."""
+    if not families:
+        return ()
     columns, ridge = _columns(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)

@@ -143,10 +143,8 @@ class Sets:
         entering = self._entering(start, never)[:BEGUN]
         self._know(_columns(entering))
         begun = [[*start, first] for first in entering]
-        more = {
-            frozenset(c.part for c in one): one
-            for one in (self._grown(one, never, 1) for one in begun)
-        }
+        grown = (self._grown(one, never, 1) for one in begun)
+        more = {frozenset(choice.part for choice in one): one for one in grown}
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
         return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
 

@@ -70,11 +70,7 @@ class FreeForm:
     @property
     def precision(self) -> Array:
         """Return the prior precision of the curves' values, in units of noise, shape (K,)."""
-        held = [
-            part.group.prior_precision(part.ridge)
-            for part in self.parts
-            if part.group.movable_curves
-        ]
+        held = [p.group.prior_precision(p.ridge) for p in self.parts if p.group.movable_curves]
         return np.concatenate([np.zeros(0), *held])
 
 

@@ -63,10 +63,7 @@ def touches(problem: Problem, model: Model) -> Touched:
     reported = tuple(each for own in every.values() for each in own.resorted(middles, usual))
     if not reported:
         return Touched(problem, model)
-    mended = [
-        every[k].recording if k in every else recording
-        for k, recording in enumerate(problem.recordings)
-    ]
+    mended = [every[k].recording if k in every else r for k, r in enumerate(problem.recordings)]
     again, start = aligned(mended, model.robot, problem.align, model.known, problem.given)
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))

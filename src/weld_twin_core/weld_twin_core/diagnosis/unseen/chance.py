@@ -135,10 +135,8 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     if rows > FEW:
         return 1.0
     rest, remaining = _noise_left(columns, precision)
-    squares = [
-        np.sum([(part.left**2).sum(axis=0) for part in _parts(rest, remaining, w)], axis=0)
-        for w in ways
-    ]
+    each = (_parts(rest, remaining, labels) for labels in ways)
+    squares = [np.sum([(part.left**2).sum(axis=0) for part in own], axis=0) for own in each]
     unseen = np.sqrt(np.max(squares, axis=0) / rows)
     floors = 1.0 if known else np.array([spread_of(each) for each in remaining.T])
     return float((unseen / floors).max())

@@ -13,12 +13,12 @@ import numpy as np
 
 from ...arrays import Array
 from ...recording import Recording
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import ROWS, Model, Problem
 from ..frames.alignment import refined
 from ..result import Unsound
 from .lag import Lag, lag
 from .lengths import distance, middle
-from .limits import ENOUGH, FAR, FEW, HALVED, ROWS, SOUND, TINY, UNEXPLAINED, WORTH
+from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Rest, Settling, Slip, changes, rest_of
 from .snapshot import Snapshot, snapshot

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import ROWS, Model, Problem
 from ..beliefs import Beliefs
 from ..frames.aligned import aligned, tracked_part
 from ..frames.alignment import refined
@@ -27,7 +27,7 @@ from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Checker, Finding, mistake
 from .images import images
-from .limits import FEW, MOST, ROWS
+from .limits import FEW, MOST
 from .mending import Given, as_entry
 from .mixups import mixups
 from .richness import motion, outliers, quantity, repeats

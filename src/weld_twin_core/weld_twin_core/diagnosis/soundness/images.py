@@ -22,8 +22,9 @@ from ...cameras.located import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
 from ..algebra.definite import outside, span_of
+from ..algebra.problem import ROWS
 from .evidence import Case, Finding, mistake
-from .limits import ENOUGH, FEW, HALVED, ROWS, STRAY, WORTH
+from .limits import ENOUGH, FEW, HALVED, STRAY, WORTH
 
 IMAGE_FAR = 1.5
 """Noise of a pixel [px] from which images are looked into. Corners of boards are found within 0.05 to

@@ -109,6 +109,3 @@ STEPS = 6
 """Gauss-Newton steps of a trial, from where a closed form or a linear fit began."""
 SAMPLES = 60
 """Samples of a trial in all: enough for every error of an arm, few enough for fits at once."""
-ROWS = 9000
-"""Rows on which a whole recording is fitted or searched: far more than the errors of an arm need,
-and enough for any instant."""

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ...twin.features import Features
-from ..algebra.problem import Model
+from ..algebra.problem import ROWS, Model
 from ..frames.alignment import refined
 from .evidence import Case, Finding, mistake
 from .lengths import distance, length
-from .limits import CLEAR, ENOUGH, FEW, LATE, MOST, ROWS, RUN, SOUND
+from .limits import CLEAR, ENOUGH, FEW, LATE, MOST, RUN, SOUND
 
 REMEDY = 'See to the driver that publishes the joint states, and measure again'
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from usual_effects import OF_CELLS, bundled
 
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
+from weld_twin_core.effects.hooks import highest_order
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
@@ -662,3 +663,15 @@ def test_a_number_beside_lists_holds_for_every_order_of_a_ripple(arm, make_recor
     np.testing.assert_array_equal(
         Twin(arm, (short,)).poses(recording).position, Twin(arm, (long,)).poses(recording).position
     )
+
+
+@pytest.mark.parametrize('samples', [30, 150, 3000, 100_000])
+def test_waves_that_a_slow_joint_passes_are_told_however_densely_it_is_sampled(samples):
+    """Neighbours of a slow seam all but coincide; three waves of order 100 are passed all the same."""
+    path = np.linspace(0.3, 0.3 + 3 * 2 * np.pi / 100, samples)
+    assert highest_order(path) >= 100
+    # Half a wave needs a position of its own: at rest at ten places, twitching by a micron or not.
+    places = np.repeat(np.linspace(0.0, 1.0, 10), 20)
+    twitching = places + 1e-6 * np.random.default_rng(1).standard_normal(places.size)
+    assert highest_order(twitching) == pytest.approx(9 * np.pi, rel=1e-4)
+    assert highest_order(np.zeros(samples)) == 0.0

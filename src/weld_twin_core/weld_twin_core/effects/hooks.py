@@ -356,7 +356,11 @@ def highest_order(q: Array) -> float:
     Above it waves look like slower ones: positions on a grid of whole degrees show nothing beyond
     180. Half a wave needs a position of its own, and positions that all but coincide are one.
     """
-    apart = np.diff(np.unique(q))
-    clusters = 1 + int((apart > _SAME).sum())
+    q = np.unique(q)
     span = float(np.ptp(q)) if q.size else 0.0
-    return np.pi * (clusters - 1) / span if span > _SAME else 0.0
+    if span <= _SAME:
+        return 0.0
+    # What is passed slowly coincides step by step all the way, and is as many as fit into it.
+    ends = np.flatnonzero(np.diff(q) > _SAME)
+    ways = q[np.append(ends, q.size - 1)] - q[np.append(0, ends + 1)]
+    return np.pi * float(ends.size + (ways // _SAME).sum()) / span

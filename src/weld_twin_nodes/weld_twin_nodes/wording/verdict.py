@@ -82,10 +82,12 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
             for f in diagnosis.families
             if f.named
         ]
-        first = (
-            f'The {size} comes from many small errors together ({sure} sure), mostly '
-            f'{listed(kinds[:_NAMED])}.'
-        )
+        if diagnosis.confidence < HALF:
+            first = f'The {size} is explained best by many small errors together, mostly '
+            first += f'{listed(kinds[:_NAMED])}; each is as sure as its card says.'
+        else:
+            first = f'The {size} comes from many small errors together ({sure} sure), mostly '
+            first += f'{listed(kinds[:_NAMED])}.'
         return first, _gain(diagnosis)
     if len(names) <= _NAMED:
         if diagnosis.confidence < HALF:

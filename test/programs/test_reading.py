@@ -251,6 +251,16 @@ def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, 
     assert any(move.kind == 'unknown' and reason in move.why for move in moves)
 
 
+def test_a_block_of_ur_that_is_not_known_ends_no_routine_before_its_end():
+    inside = 'switch(a):\ncase 1:\nb()\nend\nend\n'
+    text = 'def p():\nset_tcp(p[0,0,0.1,0,0,0])\n{}movel(p[0.3,0.2,0.1,0,3.1,0])\nend\n'
+    with pytest.raises(TwinError, match="line 7: this 'end' closes no routine"):
+        read('urscript', (text.format(inside),), 'ur5')
+    own = 'sec s():\nset_digital_out(1, True)\nend\n'
+    (step,) = read('urscript', (text.format(own),), 'ur5').steps
+    assert step.tool.value is not None and step.tool.value[2, 3] == 0.1
+
+
 def test_a_program_that_goes_along_with_a_conveyor_is_left():
     text = (MADE / 'bracket.ls').read_text()
     for schedule, along in ((0, False), (2, True)):

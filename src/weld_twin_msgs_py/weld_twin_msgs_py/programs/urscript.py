@@ -57,10 +57,10 @@ OTHER_TOOL = Frame(
 )
 """The tool of a routine that has not set its own."""
 _WORD = re.compile(
-    rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(def|thread)\s|'
-    r'(?:(if|while|for)|(elif|else)|(end)|(break|continue))\b)'
+    rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|'
+    r'(def|thread|sec)\s(?=\s*\w+\s*\()|(?:(if|while|for)|(elif|else)|(end)|(break|continue))\b)'
 )
-_NAME, _CALL = re.compile(r'\s*(\w+)'), r'(?<![\w.])(?<!def )(?<!thread ){}\s*\('
+_NAME, _CALL = re.compile(r'\s*(\w+)'), r'(?<![\w.])(?<!def )(?<!thread )(?<!sec ){}\s*\('
 _ASSIGNED = re.compile(
     r'(?:^|(?<=;))[ \t]*(?:(?:global|local)[ \t]+)?([A-Za-z_]\w*)((?:\[[^\]\r\n]*\]|\.\w+)*)[ \t]*=(?!=)'
     r'[ \t]*',
@@ -131,7 +131,12 @@ class UrscriptReader(Reader):
                 begun.append(_NAME.match(self.text, result.end()))
             elif result[7]:
                 begun.append(None)
-            elif result[9] and begun and (head := begun.pop()) is not None:
+            elif result[9] and not begun:
+                raise DataError(
+                    f"{self.where(result)}: this 'end' closes no routine, branch or loop that is known; "
+                    'write a switch as if and elif'
+                )
+            elif result[9] and (head := begun.pop()) is not None:
                 out.append((head[1], (head.end(), result.start())))
         if begun:
             where = self.source.where(len(self.text.rstrip()) - 1)

@@ -42,7 +42,6 @@ DONE = 'done'
 
 
 def listed(text: str) -> list[str]:
-    """Return what stands between commas."""
     return [part.strip() for part in text.split(',') if part.strip()]
 
 
@@ -55,7 +54,6 @@ class Study:
 
     @staticmethod
     def tell(text: str) -> None:
-        """Tell on stderr what is being done."""
         print(text, file=sys.stderr, flush=True)
 
     @contextmanager
@@ -84,7 +82,6 @@ class Study:
                 yield runner
 
     def tasks(self, tasks: Sequence[Task], what: str, store: Path | None = None) -> list[Any]:
-        """Return what came of tasks, in their order."""
         with self.runner(what, store) as runner:
             return runner.run(tasks)
 

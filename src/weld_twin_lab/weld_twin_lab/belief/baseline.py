@@ -340,7 +340,6 @@ FALLEN: dict[str, Callable[[GrowingStep], object]] = {
 
 
 def run(study: Study) -> None:
-    """Diagnose what is not diagnosed yet, score, write and print the page."""
     args = study.args
     if args.cases:
         require_simulator()

@@ -160,6 +160,5 @@ def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
 
 
 def _left(verdict: Mapping[str, Any]) -> bool:
-    """Return whether something is said to be left without a name."""
     causes: Sequence[Mapping[str, Any]] = verdict['causes']
     return verdict['status'] == 'unknown' or any(cause.get('rest') for cause in causes)

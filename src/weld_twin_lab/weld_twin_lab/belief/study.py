@@ -272,7 +272,6 @@ def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def page(result: Mapping[str, Any]) -> str:
-    """Return results of `judged` in Markdown."""
     return '\n'.join(
         [
             *_bounds(result['learned_from'], result['judged_on']),
@@ -284,7 +283,6 @@ def page(result: Mapping[str, Any]) -> str:
 
 
 def _beside_goals(result: Mapping[str, Any]) -> list[str]:
-    """Return the measures beside their goals, and what was sure and wrong."""
     return [
         'Beside the goals:',
         '',
@@ -357,7 +355,6 @@ LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
 
 
 def run(study: Study) -> None:
-    """Make what is not made yet, fit, judge, write and print the page."""
     args = study.args
     if args.cases or args.held_out:
         require_simulator()

@@ -70,7 +70,6 @@ def row_of(
 
 
 def said(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return a verdict and its statements in plain values."""
     whole = diagnosis.as_dict()
     return {
         'verdict': whole['verdict'],

@@ -17,7 +17,6 @@ from ..study import Study
 
 
 def run(study: Study) -> None:
-    """Run the benchmark; print results as they come."""
     os.environ.update(dict.fromkeys(THREADS, '1'))  # read by libraries when they are imported
 
     from .all_races import FULL, QUICK, benchmark

@@ -158,7 +158,6 @@ NEWTON_STEPS = 20
 
 
 def inverse(count: int, with_pinocchio: bool) -> Workload:
-    """Return the workload."""
     robot = load('ur5')
     q = smooth_motion(robot, count)
     poses = forward(robot, q)

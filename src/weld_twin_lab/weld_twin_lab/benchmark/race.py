@@ -56,7 +56,6 @@ class Outcome:
         return np.asarray(self.seconds[REFERENCE] / self.seconds[name])
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers and lists."""
         rows = {}
         for contender in self.workload.contenders:
             ratio = self.ratio(contender.name)
@@ -178,6 +177,5 @@ def short(ratio: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return seconds with a fitting unit."""
     scale, unit = next((u for u in UNITS if seconds >= u[0]), UNITS[-1])
     return f'{seconds / scale:.3g} {unit}'

@@ -24,7 +24,6 @@ NOT_STARTED = 127
 
 
 def main() -> None:
-    """Start the program, wait and tell."""
     report, limit, words = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3:]
     os.set_inheritable(report, False)
     start = time.perf_counter()

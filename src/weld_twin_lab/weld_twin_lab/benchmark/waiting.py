@@ -222,7 +222,6 @@ def page(entries: Sequence[Entry]) -> str:
 
 
 def summary(entries: Sequence[Entry]) -> str:
-    """Return the table in Markdown."""
     return tabled(COLUMNS, entries)
 
 
@@ -268,7 +267,6 @@ COLUMNS: dict[str, Callable[[Entry], object]] = {
 
 
 def run(study: Study) -> None:
-    """Measure all jobs and print the table."""
     args = study.args
     kept = _kept(study.out / 'waits.json') if args.only else []
     base = Path(args.base) if args.base else None

@@ -56,7 +56,6 @@ def fill(database: Database, cells: int, diagnoses: int, seed: int = 1) -> None:
 
 
 def drawn(number: int, diagnoses: int, seed: int = 1) -> Iterator[Entry]:
-    """Yield the diagnoses of a cell."""
     rng = np.random.default_rng([seed, number])
     joints = catalog.load('ur5').joint_names
     names = tuple(f'{family} {joint} 0' for family in DRIFTING for joint in joints)

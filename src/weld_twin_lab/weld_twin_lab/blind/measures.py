@@ -104,7 +104,6 @@ class Measure:
         return value >= self.goal if self.at_least else value <= self.goal
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values."""
         return {**asdict(self), 'estimate': self.estimate._asdict(), 'reached': self.reached}
 
 

@@ -61,7 +61,6 @@ class Judged:
         return self.sure and not self.right and self.status != 'unknown'
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values."""
         return {**asdict(self), 'confidently_wrong': self.confidently_wrong}
 
 

@@ -49,7 +49,6 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def write(path: Path, content: dict[str, Any], *, overwrite: bool = False) -> None:
-    """Write one of the JSON files above."""
     write_json(path, {'schema': SCHEMAS[path.name], **content}, overwrite=overwrite)
 
 
@@ -69,7 +68,6 @@ def seal_of(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def text_digest(text: str) -> str:
-    """Return the SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -13,12 +13,10 @@ from .diagnosing import diagnose_cases
 
 
 def make(study: Study) -> None:
-    """Make cases and seal their truths."""
     _made(study, study.out, Path(study.args.truths))
 
 
 def diagnose(study: Study) -> None:
-    """Diagnose cases from their recordings alone."""
     args = study.args
     with study.runner('diagnosing') as runner:
         verdicts = diagnose_cases(
@@ -33,13 +31,11 @@ def diagnose(study: Study) -> None:
 
 
 def score(study: Study) -> None:
-    """Open the seals and score the verdicts."""
     args = study.args
     _scored(study, Path(args.cases), Path(args.truths), Path(args.results), args.seal)
 
 
 def whole(study: Study) -> None:
-    """Make, diagnose and score in one go."""
     cases, truths, results = (study.out / name for name in ('cases', 'truths', 'verdicts'))
     _made(study, cases, truths)
     with study.runner('diagnosing', kept_of_engine(results)) as runner:

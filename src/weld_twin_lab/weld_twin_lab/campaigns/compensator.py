@@ -322,7 +322,6 @@ COLUMNS: dict[str, Callable[[Any], object]] = {
 
 
 def _changes(result: dict[str, Any]) -> str:
-    """Return a row for each kind of change."""
     rows = []
     for kind, one in result['after_a_change'].items():
         noticed = max(c['seconds'] for c in result['changes'] if c['change'] == kind)

@@ -250,7 +250,6 @@ class CellTrial:
         return {'robot': self.name, 'change': what, 'noticed': noticed(), 'seconds': seconds}
 
     def restore(self) -> None:
-        """Undo all changes."""
         self._late = 0
         self._inject()
         self.model.write_text(self.right.text)

@@ -238,5 +238,4 @@ def cell_of(name: str, seed: int) -> tuple[Robot, list[dict[str, Any]], np.rando
 
 
 def true_effects(robot: Robot, causes: list[dict[str, Any]]) -> tuple[Effect, ...]:
-    """Return the causes as effects."""
     return tuple(effects_from_list(causes, robot))

@@ -72,7 +72,6 @@ class Bench:
         self._joints = self.publisher(JOINT_STATES)
 
     def start(self, name: str, **parameters: Any) -> None:
-        """Start a node of the cell."""
         self.processes[name] = self.cell.start(name, **SURE, **NODES[name], **parameters)
 
     def publisher(self, topic: Topic) -> Any:
@@ -128,7 +127,6 @@ class Bench:
         self.cell.wait(due, 'the joint states to be sent', limit=seconds + 60.0)
 
     def rest(self, seconds: float) -> None:
-        """Send nothing, listen only."""
         end = time.monotonic() + seconds
         self.cell.wait(lambda: time.monotonic() >= end, 'a rest', seconds + 60.0)
 
@@ -164,12 +162,10 @@ class Stand:
         self.poses = self.publisher(MEASURED_POSE)
 
     def close(self) -> None:
-        """End the participant of the others."""
         self.other.destroy_node()
         self._context.try_shutdown()
 
     def publisher(self, topic: Topic, name: str = '') -> Any:
-        """Return a publisher of somebody else."""
         return self.other.create_publisher(
             topic.message_class(), name or topic.name, topic.offered.to_rclpy()
         )
@@ -203,7 +199,6 @@ class Stand:
         return REST + 0.15 * np.sin(np.array([0.8, 1.1, 0.5, 0.7, 0.9, 1.3]) * t + np.arange(6))
 
     def step(self) -> None:
-        """Send what is due."""
         t = time.monotonic() - self._begun
         while self._sent[0] / JOINT_RATE < t:
             at = self._sent[0] / JOINT_RATE
@@ -260,7 +255,6 @@ class Stand:
         return seen[0]
 
     def run(self, seconds: float) -> None:
-        """Let the cell work."""
         end = time.monotonic() + seconds
 
         def over() -> bool:

@@ -44,8 +44,6 @@ class Fault:
 
 
 def _third(spoil: Callable[[Any], None], bench: Bench) -> None:
-    """Spoil every third joint state."""
-
     def each(k: int) -> None:
         message = bench.joint_state()
         if k % 3 == 0:

@@ -233,7 +233,6 @@ SCENES = (
 
 
 def play(scene: Scene, folder: Path) -> dict[str, Any]:
-    """Return what was told in a scene."""
     try:
         with messages_importable(), Cell(folder) as cell:
             stand = Stand(cell, folder)

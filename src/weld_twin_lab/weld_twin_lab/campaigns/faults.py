@@ -64,7 +64,6 @@ ABUSES: tuple[tuple[str, str, Any], ...] = (
 
 
 def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
-    """Return what every node did under a fault."""
     bench.run(BEFORE)
     _settle(bench)
     marks = {name: len(process.log) for name, process in bench.processes.items()}
@@ -211,7 +210,6 @@ def abuse(bench: Bench) -> list[dict[str, Any]]:
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return what each node did under each fault."""
     everything = (*JOINT_FAULTS, *OTHER_FAULTS, *SCENES)
     mine = [each for each in everything if args.only in each.name]
     with TemporaryDirectory() as folder:
@@ -241,7 +239,6 @@ def _on_bench(faults: Sequence[Any], folder: Path, tell: Callable[[str], None]) 
 def _scenes(
     scenes: Sequence[Any], folder: Path, tell: Callable[[str], None]
 ) -> list[dict[str, Any]]:
-    """Return what was told in each scene."""
     rows = []
     for k, scene in enumerate(scenes):
         rows.append(play(scene, folder / f'scene{k}'))

@@ -122,7 +122,6 @@ def recording_of(draw: Draw) -> tuple[Recording, Robot]:
 
 
 def _positions(draw: Draw, robot: Robot, rng: np.random.Generator) -> Array:
-    """Return joint positions, shape (count, n)."""
     count = -(-draw.count // draw.repeats)
     if draw.stations:
         moved = rng.uniform(-1.0, 1.0, (count, robot.n))
@@ -184,7 +183,6 @@ def worst_of(count: int, first: int, tell: Callable[[str], None]) -> dict[str, A
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return what every kind of file came to."""
     names = list(targets())
     chosen = [name for name in args.only.split(',') if name] or names
     if unknown := set(chosen) - set(names):
@@ -218,7 +216,6 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row for each kind of file."""
     kinds = [
         (name, row['right'], row['refused'], row['wrong']) for name, row in result['kinds'].items()
     ]

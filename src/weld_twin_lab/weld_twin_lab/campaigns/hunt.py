@@ -322,7 +322,6 @@ def _device(folder: Path) -> Path:
 
 
 def _zeros(pack: str) -> bytes:
-    """Return a gigabyte of zeros, packed."""
     if pack == 'lz4':
         return bytes(lz4_compress(bytes(GIGABYTE)))
     packer = zstd.ZstdCompressor()

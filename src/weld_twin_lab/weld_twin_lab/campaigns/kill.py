@@ -61,7 +61,6 @@ class _Sent:
     )
 
     def before(self, moment: float) -> int:
-        """Return how many were sent by then."""
         return sum(int(np.searchsorted(times, moment)) for times in self.times.values())
 
     def missing(self, topic: str, received: int, moment: float) -> float:
@@ -192,7 +191,6 @@ ALLOWED = 1.0
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return one row for each kill, and what they come to."""
     rng = np.random.default_rng(args.seed)
     rows: list[dict[str, Any]] = []
     for k in range(args.times):
@@ -235,7 +233,6 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row for each storage."""
     head = ('storage', 'kills', 'gaps, repeats, broken bags', 'missing, median', 'missing, worst')
     rows = []
     for name in ('mcap', 'sqlite3'):

@@ -77,7 +77,6 @@ class Contender:
         self.cpu = self.sent = 0
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Start the process."""
         self.process = subprocess.Popen(self._command, stderr=subprocess.DEVNULL)
         return self.process
 
@@ -109,13 +108,11 @@ class Contender:
         }
 
     def add(self, other: Contender) -> None:
-        """Take over the samples of another."""
         self.turns += other.turns
         self.cpu += other.cpu
         self.sent += other.sent
 
     def clear(self) -> None:
-        """Forget the samples."""
         self.turns = []
         self.cpu = self.sent = 0
 
@@ -130,7 +127,6 @@ class Race:
         self._stack = ExitStack()
 
     def __enter__(self) -> Race:
-        """Start the contenders and what feeds them."""
         self._stack.enter_context(messages_importable())
         self._stack.enter_context(own_domain())
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -160,7 +156,6 @@ class Race:
         return process
 
     def __exit__(self, *_: object) -> None:
-        """End all processes."""
         self._stack.close()
 
     def turn(self, contender: Contender, rate: float, seconds: float) -> None:

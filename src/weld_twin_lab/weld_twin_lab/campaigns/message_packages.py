@@ -190,7 +190,6 @@ def _interfaces(package: str) -> dict[str, Mapping[str, str]]:
 
 
 def _generate(package: str, source: Path, made: Path, site: Path) -> None:
-    """Run the generators of ROS over the definitions."""
     from rosidl_adapter.cli import TranslateActionToIDL, TranslateMsgToIDL
     from rosidl_generator_c.cli import GenerateC
     from rosidl_generator_py.cli import GeneratePython

@@ -84,7 +84,6 @@ def frames() -> None:
 
 
 def pulse() -> None:
-    """Send what is asked for."""
     node = Node('pulse')
     robot, make = catalog.load(ROBOT), ros_messages()
     state = make.joint_state(1, robot.joint_names, HOME, np.zeros(robot.n), 'base_link')

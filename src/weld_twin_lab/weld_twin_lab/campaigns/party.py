@@ -40,7 +40,6 @@ SWING = 0.3
 
 
 def main() -> int:
-    """Say and hear for a time."""
     seconds, mark = remove_ros_args(sys.argv)[1:]
     rclpy.init()
     # Nothing but what it is there for: its policy is short, and only that is refused.

@@ -160,7 +160,6 @@ def _environment(install: Path) -> Mapping[str, str]:
 
 
 def _bundled() -> list[Path]:
-    """Return the folders in which wheels keep the libraries they bring."""
     return [place for root in map(Path, sys.path) for place in root.glob('ros_*.libs')]
 
 
@@ -181,7 +180,6 @@ def keystore(folder: Path, policy: Path, enclaves: Iterable[str]) -> Path:
 
 
 def main(folder: str, policy: str, *enclaves: str) -> int:
-    """Make the keystore; return the exit code."""
     try:
         from sros2.keystore import create_enclave, create_keystore, create_permission
     except ImportError as error:

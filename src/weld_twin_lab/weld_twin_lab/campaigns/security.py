@@ -229,7 +229,6 @@ def verdict(result: dict[str, Any]) -> bool:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row of each party without keys and with them."""
     head = ('keys', 'who', "twin's poses it heard", 'joint states of it that were recorded')
     rows = [
         (way, who, result[way]['heard'][k], result[way]['recorded'][k])

@@ -87,7 +87,6 @@ class Soak:
         self._work: dict[int, Usage] = {}
 
     def __enter__(self) -> Soak:
-        """Start the nodes."""
         self._cell.__enter__()
         try:
             self._start()
@@ -97,7 +96,6 @@ class Soak:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the nodes."""
         self._cell.__exit__()
 
     def finish(self) -> None:
@@ -249,7 +247,6 @@ EFFECTS = """
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return memory, CPU share and losses of every node."""
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: args.cores])
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'

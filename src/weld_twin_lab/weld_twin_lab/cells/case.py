@@ -217,7 +217,6 @@ def _told(robot: Robot, recording: Recording, cause: Cause) -> CellResult:
 
 
 def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> CellResult:
-    """Return what a diagnosis says beside the truth."""
     groups = [[(s.effect, s.joint) for s in group] for group in diagnosis.indistinguishable]
     groups = groups or [[(item.effect.name, item.effect.site)] for item in diagnosis.effects]
     named = any(truth in group for group in groups)

@@ -150,7 +150,6 @@ def _real(real: Sequence[CellResult]) -> str:
 
 
 def run(study: Study) -> bool:
-    """Run what is not done yet, write the result, print the table."""
     require_simulator()
     args = study.args
     seeds = range(args.seed, args.seed + args.cells)

@@ -31,9 +31,13 @@ class Proof(NamedTuple):
     jobs: Mapping[str, Proof] = {}
 
 
+def _proof(run: str, text: str, *options: Options) -> Proof:
+    return Proof(run, text, options)
+
+
 def _campaign(text: str, *options: str) -> Proof:
     out = '--out FILE, required  JSON file to write, or to replace if it is of the same campaign'
-    return Proof('campaigns:run', text, (*options, out))
+    return _proof('campaigns:run', text, *options, out)
 
 
 OUT = '--out DIR, required  where results go'
@@ -47,54 +51,50 @@ DRAW = """
 """
 CASES = 'CASES  cases made by blind make'
 BLIND = {
-    'make': Proof(
+    'make': _proof(
         'blind.study:make',
         """Make cases and seal their truths.
 
         Prints the seal, a hash over all cases and truths; publish it before anybody diagnoses.
         """,
-        (
-            DRAW,
-            '--truths DIR, required  where the truths go; keep it where a diagnosis cannot read',
-            POOL,
-            '--out DIR, required  where the recordings go',
-        ),
+        DRAW,
+        '--truths DIR, required  where the truths go; keep it where a diagnosis cannot read',
+        POOL,
+        '--out DIR, required  where the recordings go',
     ),
-    'diagnose': Proof(
+    'diagnose': _proof(
         'blind.study:diagnose',
         """Diagnose cases from their recordings alone.
 
         Refuses to run where the truths could be read. Stopped, it goes on where it was when run again.
         """,
-        (
-            CASES,
-            '--allow-readable   go on although truths lie within reach; the score tells',
-            '--without-holdout  judge the shrink on stretches of the training recording',
-            POOL,
-            '--out DIR, required  where the verdicts go',
-        ),
+        CASES,
+        '--allow-readable   go on although truths lie within reach; the score tells',
+        '--without-holdout  judge the shrink on stretches of the training recording',
+        POOL,
+        '--out DIR, required  where the verdicts go',
     ),
-    'score': Proof(
+    'score': _proof(
         'blind.study:score',
         """Open the seals and score the verdicts.
 
         Exits with 2 when a case, a truth or the list of them is not what was sealed.
         """,
-        (
-            CASES,
-            '--truths DIR, required   their truths',
-            '--results DIR, required  verdicts of blind diagnose',
-            '--seal HASH              the seal as it was printed before the diagnosis',
-            '--out DIR, required  where score.json and score.md go',
-        ),
+        CASES,
+        '--truths DIR, required   their truths',
+        '--results DIR, required  verdicts of blind diagnose',
+        '--seal HASH              the seal as it was printed before the diagnosis',
+        '--out DIR, required  where score.json and score.md go',
     ),
-    'run': Proof(
+    'run': _proof(
         'blind.study:whole',
         """Make, diagnose and score in one go.
 
         The truths lie beside the cases then; nothing but the code keeps the diagnosis from reading them.
         """,
-        (DRAW, POOL, EVERYTHING),
+        DRAW,
+        POOL,
+        EVERYTHING,
     ),
 }
 CAMPAIGNS = {
@@ -178,7 +178,7 @@ CAMPAIGNS = {
     ),
 }
 PROOFS = {
-    'baseline': Proof(
+    'baseline': _proof(
         'belief.baseline:run',
         """What an engine says of cells with one to six causes, beside what other engines said.
 
@@ -186,19 +186,17 @@ PROOFS = {
         table. Tables of other engines, made by the same command on their code, are set beside it.
         Stopped, it goes on where it was when run again.
         """,
-        (
-            """
+        """
 --cases N                diagnose the first N cells of a seed [default: 0]
 --seed N                 their seed [default: 1]
 --beside NAME=TABLE ...  tables that other engines made of the same cells
 --growing                diagnose every cell with one to four recordings, and in reverse: does more
   data hurt?
 """,
-            POOL,
-            EVERYTHING,
-        ),
+        POOL,
+        EVERYTHING,
     ),
-    'belief': Proof(
+    'belief': _proof(
         'belief.study:run',
         """How far a diagnosis can be trusted: learned on cases with known truths, judged on others.
 
@@ -209,8 +207,7 @@ PROOFS = {
         those learned from are judged by weights that had not seen them. Stopped, it goes on where it was
         when run again.
         """,
-        (
-            """
+        """
 --cases N               cases to learn from [default: 0]
 --seed N                their seed [default: 1]
 --held-out N            cases to judge on [default: 0]
@@ -221,21 +218,18 @@ PROOFS = {
 --judge-on TABLE ...    tables kept from other runs
 --risk X                probability that an answer may be sure and wrong [default: 0.003]
 """,
-            POOL,
-            EVERYTHING,
-        ),
+        POOL,
+        EVERYTHING,
     ),
-    'benchmark': Proof(
+    'benchmark': _proof(
         'benchmark:run',
         """Time the twin beside its peers, after checking that they agree.
 
         Peers that are not installed are left out. One thread; contenders take turns, so that the ratios
         hold on a busy machine too. Writes benchmark.json and a table (benchmark.md) to the directory.
         """,
-        (
-            folder_output('where results go'),
-            '--quick  small sizes, to see that it runs',
-        ),
+        folder_output('where results go'),
+        '--quick  small sizes, to see that it runs',
     ),
     'blind': Proof(
         '',
@@ -254,7 +248,7 @@ PROOFS = {
         """,
         jobs=CAMPAIGNS,
     ),
-    'cells': Proof(
+    'cells': _proof(
         'cells.study:run',
         """Are causes told in whole cells, and from pixels, as on one arm under a tracker?
 
@@ -263,18 +257,16 @@ PROOFS = {
         by a tracker. Writes cells.json and cells.md; a run that was interrupted goes on where it
         stopped.
         """,
-        (
-            """
+        """
 --cells N    sealed cells of every kind [default: 14]
 --cameras N  sealed arms before cameras [default: 40]
 --seed N     the first that is drawn [default: 0]
 --data DIR   published recordings: holds motoman_left
 """,
-            POOL,
-            OUT,
-        ),
+        POOL,
+        OUT,
     ),
-    'contest': Proof(
+    'contest': _proof(
         'contest.scores:run',
         """Methods of different make on the same sealed cases, by the same rules.
 
@@ -284,8 +276,7 @@ PROOFS = {
         was stopped goes on: what is in --out is not made again. Remove the directory of a method to have
         it answer anew.
         """,
-        (
-            """
+        """
 --cases DIR, required   as blind make wrote them
 --truths DIR, required  their truths
 --first N               only so many cases [default: 0]
@@ -294,10 +285,9 @@ PROOFS = {
 --ur5 DIR               holds grid.csv, random.csv
 --ur10 DIR              holds series_c_random_poses.csv
 """,
-            OUT,
-        ),
+        OUT,
     ),
-    'coverage': Proof(
+    'coverage': _proof(
         'coverage.study:run',
         """Promises with an interval: do nine of ten lie in theirs, and how wide are they?
 
@@ -307,8 +297,7 @@ PROOFS = {
         first measurement. Writes coverage.json and coverage.md; a run that was interrupted goes on where
         it stopped.
         """,
-        (
-            """
+        """
 --ur5 DIR    holds grid.csv; with --ur10
 --ur10 DIR   holds series_c_random_poses.csv
 --cases N    the first N sealed cases of a seed [default: 0]
@@ -318,11 +307,10 @@ PROOFS = {
 --plans N    plans of a first measurement [default: 0]
 --seed N     of all that is drawn [default: 1]
 """,
-            POOL,
-            OUT,
-        ),
+        POOL,
+        OUT,
     ),
-    'efforts': Proof(
+    'efforts': _proof(
         'real_arms.by_effort:run',
         """Do springs by measured efforts predict a real arm better than springs by the model's statics?
 
@@ -330,14 +318,12 @@ PROOFS = {
         both on the stretch, beside plain fits of frames and geometry: efforts.md. Beside it lies the
         diagnosis of all stations with efforts, with its page, as weld-twin diagnose writes it.
         """,
-        (
-            'TABLE  stations with measured poses and efforts',
-            ROBOT,
-            '--folds N  stretches [default: 5]',
-            folder_output('where table and page go'),
-        ),
+        'TABLE  stations with measured poses and efforts',
+        ROBOT,
+        '--folds N  stretches [default: 5]',
+        folder_output('where table and page go'),
     ),
-    'gate': Proof(
+    'gate': _proof(
         'gate.trials:run',
         """Make every mistake of data and set-up, and see whether the gate names it and spares the sound.
 
@@ -346,18 +332,16 @@ PROOFS = {
         alignment.
         A run that was interrupted goes on where it stopped.
         """,
-        (
-            """
+        """
 --seed N      decides what is drawn [default: 20]
 --draws N     of every kind, as bag and as table [default: 10]
 --sound N     sound recordings [default: 300]
 --kinds LIST  only these mistakes, comma-separated
 """,
-            POOL,
-            '--out OUT, required  directory for gate.json and gate.md',
-        ),
+        POOL,
+        '--out OUT, required  directory for gate.json and gate.md',
     ),
-    'investigate': Proof(
+    'investigate': _proof(
         'experiments.study:run',
         """Investigations: do the experiments that are asked for decide?
 
@@ -366,19 +350,17 @@ PROOFS = {
         five minutes at most. Writes investigate.json and investigate.md; a run that was interrupted goes
         on where it stopped, and one with --minutes writes what there is after so long.
         """,
-        (
-            """
+        """
 --seed N            decides the cells [default: 1]
 --cells N           cells that are left open at first [default: 120]
 --minutes M         begin no further cells after so many minutes, and write what there is [default: inf]
 --learn-from TABLE ...  learn the weights of the rule that closes a question from investigate.json of
   other cells, and write closing.md with what they are worth on cells that they were not learned from
 """,
-            POOL,
-            OUT,
-        ),
+        POOL,
+        OUT,
     ),
-    'programs': Proof(
+    'programs': _proof(
         'programs.corrections:run',
         """Robot programs: does a corrected one help?
 
@@ -386,16 +368,14 @@ PROOFS = {
         and driven by the plant. Writes corrections.json and corrections.md; a run that was interrupted
         goes on where it stopped.
         """,
-        (
-            """
+        """
 --seams N  sealed seams a language [default: 1]
 --seed N   decides the seams [default: 1]
 """,
-            POOL,
-            OUT,
-        ),
+        POOL,
+        OUT,
     ),
-    'real-arms': Proof(
+    'real-arms': _proof(
         'real_arms.study:run',
         """Real arms that nobody tuned on: which causes are told, and do unseen data bear them out?
 
@@ -405,17 +385,15 @@ PROOFS = {
         and a servo axis that are poor on purpose are judged beside plain fits: poor.json, poor.md, and
         exit code 1 when a goal is missed. Stopped, it goes on where it was when run again.
         """,
-        (
-            """
+        """
 --data DIR, required  holds ur5_laser_tracker, emps, mukca, ...
 --only TEXT           only rows whose names contain this
 --poor                judge recordings that are poor on purpose
 """,
-            POOL,
-            OUT,
-        ),
+        POOL,
+        OUT,
     ),
-    'waits': Proof(
+    'waits': _proof(
         'benchmark.waiting:run',
         """What people wait for: whole commands started cold, beside those of another checkout.
 
@@ -423,32 +401,28 @@ PROOFS = {
         Writes waits.json and waits.md. With --only, the other rows of a waits.json in --out stay as they
         are; every row says when and with which versions it was measured.
         """,
-        (
-            """
+        """
 --base DIR       another checkout, after make setup; left out, only this
 --runs N         pairs of runs [default: 3]
 --only TEXT ...  jobs whose name has one of these
 """,
-            OUT,
-        ),
+        OUT,
     ),
-    'years': Proof(
+    'years': _proof(
         'fleet.years:run',
         """Live through simulated years of weekly checks, and see which changes the history finds.
 
         Most years are drawn: how sure each diagnosis is comes from real ones. Some are simulated by the
         plant and diagnosed in full. A run that was interrupted goes on where it stopped.
         """,
-        (
-            """
+        """
 --seed N   decides the cells and the years [default: 26]
 --years N  drawn years [default: 200]
 --cells N  cells they are of [default: 12]
 --full N   years diagnosed in full [default: 2]
 """,
-            POOL,
-            '--out OUT, required  directory for the results',
-        ),
+        POOL,
+        '--out OUT, required  directory for the results',
     ),
 }
 
@@ -465,7 +439,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: Given) -> int:
-    """Run the proof."""
     proof = PROOFS[args.proof]
     module, _, name = (proof.jobs[args.job] if proof.jobs else proof).run.partition(':')
     function = getattr(import_module(f'weld_twin_lab.{module}'), name)

@@ -62,7 +62,6 @@ class ContestCase:
 
     @property
     def measured(self) -> Measurements:
-        """Return what was measured to learn from."""
         return measured_of(self.train)
 
     @property
@@ -193,7 +192,6 @@ def _read_signal(path: Path, static: bool) -> Signal | None:
 
 
 def write_answer(folder: Path, answer: ContestAnswer) -> None:
-    """Write an answer."""
     folder.mkdir(parents=True, exist_ok=True)
     content = {
         'causes': [

@@ -105,7 +105,6 @@ def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
 
 
 def point(answer: ContestAnswer, case: Sealed) -> Point:
-    """Return what an answer was worth."""
     truth = case.truth
     there = answer.none < LIKELY and (bool(answer.causes) or answer.unknown >= LIKELY)
     something = truth['kind'] != 'none'
@@ -176,7 +175,6 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
 
 
 def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, Any]:
-    """Return the shares and medians of one method."""
     points = [point(run.answer, cases[name]) for name, run in runs.items() if run.answer]
     out: dict[str, Any] = {'cases': len(runs), 'answers': len(points)}
     for key in ('detected', 'false_alarm', 'family', 'joint', 'belief', 'sure_wrong'):
@@ -224,7 +222,6 @@ COLUMNS: dict[str, Callable[[Any], object]] = {
 
 
 def run(study: Study) -> None:
-    """Run the contest and print the tables."""
     args = study.args
     methods = course.commands(listed(args.entrants) or list(ENTRANTS), args.enter)
     content, table = _on_sealed(study, methods)

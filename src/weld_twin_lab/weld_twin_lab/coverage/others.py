@@ -143,7 +143,6 @@ class Sealed(NamedTuple):
 
 
 def made(seed: int) -> Sealed:
-    """Return one sealed case."""
     rng = np.random.default_rng(seed)
     tool = np.eye(4)
     tool[:3, 3] = [0.02, -0.03, 0.15]

@@ -292,12 +292,10 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
 
 
 def summary_table(entries: Sequence[Entry]) -> str:
-    """Return the table of `summaries`."""
     return tabled(SUMMARIES, summaries(entries))
 
 
 def entry_table(entries: Sequence[Entry]) -> str:
-    """Return the table of every recording and region."""
     rows = [(entry, region) for entry in entries for region in REGIONS if region in entry]
     return tabled(ENTRIES, rows)
 
@@ -347,7 +345,6 @@ ENTRIES: dict[str, Callable[[Any], object]] = {
 
 
 def run(study: Study) -> None:
-    """Try what is not tried yet, and print what it holds."""
     args = study.args
     drawn = args.cases, args.seams, args.touches, args.cells, args.plans
     if bool(args.ur5) is not bool(args.ur10) or not (args.ur5 or any(drawn)):

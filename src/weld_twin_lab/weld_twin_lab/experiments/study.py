@@ -48,7 +48,6 @@ class Heard(NamedTuple):
     """Which cell, and which of its rounds, shape (N,)."""
 
     def only(self, rows: NDArray[Any]) -> Heard:
-        """Return some of them."""
         return Heard(*(column[rows] for column in self))
 
 
@@ -124,7 +123,6 @@ Case = dict[str, Any]
 
 
 def summary(cases: Sequence[Case]) -> dict[str, Any]:
-    """Return the measures over all cells."""
     if not cases:
         return {'cells': 0}
     rounds = [step for case in cases for step in case['rounds']]
@@ -162,7 +160,6 @@ def _count(cases: Sequence[Case], holds: Callable[..., bool]) -> int:
 
 
 def page(result: dict[str, Any]) -> str:
-    """Return the results in Markdown."""
     totals, cases = result['summary'], result['cases']
     if not cases:
         return 'No cell was left open.\n'
@@ -266,7 +263,6 @@ def investigated_cell(seed: int, number: int) -> dict[str, Any]:
 
 
 def run(study: Study) -> None:
-    """Investigate what is not done yet, and print the tables."""
     args = study.args
     if args.learn_from:
         study.write('closing', page=closing_page(_kept(args.learn_from)))

@@ -254,11 +254,9 @@ class SealedCell:
         return dict(json.loads(diagnosis_text(diagnosis, ())))
 
     def opened(self) -> dict[str, Any]:
-        """Return the truth."""
         return self._case.told(self.name)
 
     def judged(self, diagnosis: Mapping[str, Any]) -> Judged:
-        """Return what a diagnosis is worth."""
         return judge(self.opened(), diagnosis)
 
 
@@ -290,5 +288,4 @@ def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
 
 
 def stations(q: Array) -> Motion:
-    """Return stations one after the other."""
     return Motion(STAY * np.arange(len(q), dtype=float), q, static=True)

@@ -99,7 +99,6 @@ def _full(seed: int, number: int, bases: Sequence[Result], runner: Runner) -> di
 
 
 def figures(years: Sequence[Result]) -> dict[str, Any]:
-    """Return the measures of some years."""
     real = [e for year in years for e in year['events'] if e['reached'] is not None]
     in_time = [e['found'] is not None and e['found'] <= e['reached'] + GRACE for e in real]
     detected = [e for e in real if e['found'] is not None]
@@ -204,7 +203,6 @@ def lived(seed: int, number: int, first: Mapping[str, Any]) -> Year:
 
 
 def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[str, Any]) -> Any:
-    """Return the entry of one week's check."""
     yearly = draw(seed, number)
     off = moved(lived(seed, number, first).events, week)
     stands = set_up(np.random.default_rng([seed, number, 3, set_up_number]))
@@ -311,13 +309,11 @@ def _root(precision: Array) -> Array:
 
 
 def _joints(check: Entry) -> list[str]:
-    """Return the arm's joints in their order."""
     family = 'joint_offset '
     return [name.split(' ')[1] for name in check.names if name.startswith(family)]
 
 
 def run(study: Study) -> bool:
-    """Run what is not done yet, write the results, print the table."""
     require_simulator()
     args = study.args
     with study.runner('living through years') as runner:

@@ -122,7 +122,6 @@ def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str)
 
 
 def as_bag(recording: Recording, robot: Robot, folder: Path) -> Recording:
-    """Return the recording after it was a bag in the folder."""
     write_recording(folder / 'bag', recording, robot)
     return read_recording(folder / 'bag', robot, one_clock=False)
 
@@ -233,7 +232,6 @@ def _cell(counts: Mapping[str, Any] | None) -> str:
 
 
 def run(study: Study) -> bool:
-    """Run what is not done yet, write the result, print the table."""
     require_simulator()
     args = study.args
     kinds = listed(args.kinds) or list(KINDS)

@@ -27,7 +27,6 @@ class Motion(NamedTuple):
 
 
 def identity() -> Motion:
-    """Return the motion that moves nothing."""
     return Motion(np.eye(3), np.zeros(3))
 
 
@@ -41,7 +40,6 @@ def compose(*motions: Motion) -> Motion:
 
 
 def inverse(motion: Motion) -> Motion:
-    """Return the motion that undoes the given one."""
     back = np.swapaxes(motion.rotation, -1, -2)
     return Motion(back, -np.einsum('...ij,...j->...i', back, motion.position))
 

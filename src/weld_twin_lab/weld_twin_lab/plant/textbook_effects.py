@@ -60,11 +60,9 @@ class Causes:
     joints: tuple[str, ...]
 
     def of(self, effect: str) -> Iterator[Entry]:
-        """Yield the entries of one effect."""
         return (item for item in self.items if item['effect'] == effect)
 
     def joint(self, name: str) -> int:
-        """Return the row of a joint."""
         if name not in self.joints:
             raise ValueError(f'no joint {name!r}; joints: {", ".join(self.joints)}')
         return self.joints.index(name)

@@ -199,7 +199,6 @@ def _off(seam: SealedSeam, text: str, meant: Driven) -> tuple[float, float]:
 
 
 def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:
-    """Return the diagnosis of the free motion and of the seam."""
     known = effects_from_list(list(seam.cell.known), seam.robot)
     return diagnose(seam.recordings(along, seed), seam.robot, known=known)
 
@@ -296,7 +295,6 @@ def totals(cases: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 def page(result: dict[str, Any]) -> str:
-    """Return the results as tables in Markdown."""
     rows = [item for item in result['totals'].items() if item[1]['cases']]
     drawn = [case for case in result['cases'] if 'undrawn' not in case]
     why = Counter(_plain(case['why']) for case in drawn if case['why'])
@@ -365,7 +363,6 @@ SEAMS: dict[str, Callable[[Any], object]] = {
 
 
 def run(study: Study) -> None:
-    """Correct and drive what is not done yet, and print the table."""
     require_simulator()
     seed = study.args.seed
     tasks = [

@@ -28,12 +28,10 @@ NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 
 
 def numbers(text: str) -> list[float]:
-    """Return all numbers of a text."""
     return [float(v) for v in re.findall(NUMBER, text)]
 
 
 def pose(position: Any, rotation: Rotation) -> Place:
-    """Return a pose, shape (4, 4)."""
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = rotation.as_matrix(), position
     return out
@@ -106,7 +104,6 @@ def rapid(files: Texts) -> Moves:
 
 
 def rapid_target(kind: str, body: str) -> Place:
-    """Return a robtarget or jointtarget."""
     values = numbers(body)
     if kind == 'jointtarget':
         return np.radians(values[:6])
@@ -115,7 +112,6 @@ def rapid_target(kind: str, body: str) -> Place:
 
 
 def urscript(files: Texts) -> Moves:
-    """Return the moves of a script."""
     text = re.sub(r'"[^"\n]*"', '', re.sub(r'#.*', '', files[0]))
     known: dict[str, Place] = {}
     for name, body in re.findall(r'(\w+)\s*=\s*(p?\[[^\]]*\])', text):
@@ -133,7 +129,6 @@ def urscript(files: Texts) -> Moves:
 
 
 def ur_value(text: str) -> Place:
-    """Return a pose or joint positions."""
     values = numbers(text)
     if not text.startswith('p'):
         return np.array(values)

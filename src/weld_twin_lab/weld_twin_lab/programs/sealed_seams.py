@@ -207,7 +207,6 @@ def lot_of(language: str, seed: int, number: int, deck: int = 0) -> Lot:
 
 
 def drawn_as(seam: SealedSeam) -> dict[str, Any]:
-    """Return what was drawn, in plain values."""
     lot = seam.case.lot
     return {
         'language': seam.language,

@@ -84,7 +84,6 @@ class Borne:
 
     @property
     def out(self) -> bool:
-        """Return whether the kind is borne out."""
         return self.median >= GROWS and self.least >= 0.0
 
 

@@ -110,7 +110,6 @@ def table(name: str, done: Sequence[Fold]) -> str:
 
 
 def run(study: Study) -> None:
-    """Judge every stretch, diagnose the whole, write table and page, print the table."""
     args = study.args
     if args.folds < 2:
         raise ModelError(f'--folds {args.folds}: give two stretches or more')

@@ -182,14 +182,12 @@ def _below(what: str, value: float, goal: float, blame: tuple[str, ...] = ()) ->
 
 
 def page(entries: Sequence[Entry], measured: Sequence[Measure]) -> str:
-    """Return both tables, and that of the servo axis."""
     parts = [goal_table(measured), split_table(entries)]
     parts += [axis_table(e) for e in entries if e['kind'] == 'servo_axis']
     return '\n'.join(parts)
 
 
 def goal_table(measures: Sequence[Measure]) -> str:
-    """Return one line per measure."""
     rows = [(m.what, m.goal, m.got, REACHED[m.reached]) for m in measures]
     return markdown.table(('measure', 'goal', 'got', ''), *rows)
 

@@ -154,7 +154,6 @@ def _touched(recording: Recording, contacts: Contacts, rows: Rows) -> Recording:
 
 
 def _points(recording: Recording) -> Recording:
-    """Return a recording of poses without their turns."""
     measured = recording.measured
     assert measured is not None
     return recording.with_measured(Measurements(measured.t, measured.position))

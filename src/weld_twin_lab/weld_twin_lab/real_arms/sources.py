@@ -374,7 +374,6 @@ def swinging(data: Path) -> Source:
 
 
 def _stations(name: str, q: Array, rows: dict[str, Array], t: Array | None) -> Recording:
-    """Return stations with measured poses."""
     place = np.stack([rows[f'{k} [m]'] for k in 'xyz'], axis=1)
     turn = Rotation.from_quat(np.stack([rows[f'q{k}'] for k in 'xyzw'], axis=1)).as_matrix()
     t = np.arange(float(len(q))) if t is None else t

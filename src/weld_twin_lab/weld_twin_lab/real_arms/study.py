@@ -133,7 +133,6 @@ def worth(entry: Mapping[str, Any], against: str) -> float:
 
 
 def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the figures of all rows together."""
     done = [e for e in entries if 'status' in e]
     claims = [c for e in done for c in e['claims']]
     shown = [(e, k) for e in done for k, b in e.get('kinds', {}).items() if b['out']]
@@ -241,7 +240,6 @@ def _accused(entry: Mapping[str, Any]) -> bool:
 
 
 def _said(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return status and causes."""
     causes = [
         {
             'probability': c.probability,
@@ -288,7 +286,6 @@ def _spread(model: Model, other: Recording) -> float:
 
 
 def run(study: Study) -> bool:
-    """Judge what is not judged yet, write and print the table."""
     data = study.args.data
     if not Path(data).is_dir():
         raise DataError(f"'{data}' is no directory; --data names the parent of the recordings")

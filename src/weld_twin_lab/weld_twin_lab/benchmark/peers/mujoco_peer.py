@@ -36,7 +36,6 @@ def arm_model(robot: Robot) -> mujoco.MjModel:
 
 
 def make(robot: Robot) -> Peer:
-    """Return the peer."""
     model = arm_model(robot)
     data = mujoco.MjData(model)
     site = model.site('tool').id

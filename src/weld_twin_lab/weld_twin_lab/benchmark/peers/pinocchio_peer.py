@@ -39,7 +39,6 @@ def dh_model(robot: Robot) -> tuple[pin.Model, int]:
 
 
 def make(robot: Robot) -> Peer:
-    """Return the peer."""
     model, tool = chain_model(robot)
     data = model.createData()
     wide, wide_tool = dh_model(robot)

@@ -94,7 +94,6 @@ def geometry(case: ContestCase) -> ContestAnswer:
 
 
 def answer_with(case: ContestCase, free: tuple[str, ...]) -> ContestAnswer:
-    """Return what a fit of some of the DH values says."""
     fitted = fit(case, free)
     moved: dict[tuple[str, str | None], float] = defaultdict(float)
     for (name, row), value, error, effect in zip(
@@ -181,5 +180,4 @@ def bootstrap(case: ContestCase) -> ContestAnswer:
 
 
 def never_knows(case: ContestCase) -> ContestAnswer:
-    """Return that the cause is unknown."""
     return ContestAnswer(nominal(case, case.ask.joints, case.times), unknown=1.0)

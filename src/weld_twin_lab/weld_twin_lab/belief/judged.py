@@ -49,7 +49,8 @@ def kept(row: Mapping[str, Any]) -> dict[str, Any]:
     if row['error'] or not row['statements']:
         return {key: row.get(key) for key in ('name', 'error', 'unsound')}
     truth, verdict = row['truth'], row['verdict']
-    judgement = judge(_with_absorbed(row), {'verdict': {'effects': (), **verdict}})
+    known = {**truth, 'causes': (), 'alike': [*truth['alike'], *_absorbed(row)]}
+    judgement = judge(known, {'verdict': {'effects': (), **verdict}})
     right = _right(row, judgement)
     sealed, causes = row['sealed'], verdict['causes']
     as_good = sealed['after'] < AS_GOOD * sealed['floor'] and judgement.status in NAMING
@@ -79,11 +80,6 @@ def kept(row: Mapping[str, Any]) -> dict[str, Any]:
         'seconds': row['seconds'],
         'examples': [list(one) for one in _examples(row, right)],
     }
-
-
-def _with_absorbed(row: Mapping[str, Any]) -> dict[str, Any]:
-    truth = row['truth']
-    return {**truth, 'causes': (), 'alike': [*truth['alike'], *_absorbed(row)]}
 
 
 def _right(row: Mapping[str, Any], judgement: Judged) -> bool:

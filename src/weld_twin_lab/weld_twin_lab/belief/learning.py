@@ -42,12 +42,8 @@ def fitted(
     Return the weights of least penalised log loss.
 
     columns: standardised, shape (N, P).
-    right: shape (N,).
-    signs: 1 where a weight may not be negative, -1 where it may not be positive, 0 where it is
-    free, shape (P,).
-    ridge: of half the squared distance from the prior, against log loss in nats.
-    weight: of every example, shape (N,).
-    prior: weights that the ridge pulls to, shape (P,); zeros when left out.
+    signs: 1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
+    ridge: of half the squared distance from the prior, else zeros, against log loss in nats.
     near: weights to begin with, where those of nearly the same examples are known.
     """
     prior = np.zeros(columns.shape[1]) if prior is None else prior
@@ -193,12 +189,9 @@ def learned(
     examples: Sequence[Example], card: Mapping[str, Any], risk: float = RISK
 ) -> dict[str, Any]:
     """
-    Return the content of a file of weights.
+    Return the content of a file of weights; raises DataError where examples of a kind are too few.
 
     card: seeds, engines and mix, to be kept with the weights.
-    risk: probability that an answer may be sure and wrong.
-
-    Raises DataError: there are too few examples of a kind of statement.
     """
     statements, parts = {}, {}
     numbers = Counter(example.kind for example in examples)
@@ -228,7 +221,10 @@ def learned(
         'card': {
             **card,
             'risk': {'answer': risk, 'cause': CAUSE_RISK},
-            'bounds': {what: _rounded(bound) for what, bound in bounds.items()},
+            'bounds': {
+                what: {key: round(float(value), 5) for key, value in bound._asdict().items()}
+                for what, bound in bounds.items()
+            },
         },
         'sure_from': {what: bound.sure_from for what, bound in bounds.items()},
         'statements': statements,
@@ -295,10 +291,6 @@ def _families(examples: Sequence[Example]) -> dict[str, int]:
 def count_of(content: Mapping[str, Any]) -> int:
     """Return how many weights were learned, constants included."""
     return sum(1 + len(own['weights']) for own in content['statements'].values())
-
-
-def _rounded(bound: Bound) -> dict[str, Any]:
-    return {key: round(float(value), 5) for key, value in bound._asdict().items()}
 
 
 def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:

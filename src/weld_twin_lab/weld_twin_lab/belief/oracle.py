@@ -147,12 +147,7 @@ def _bench(case: SealedCase, k: int, rng: np.random.Generator) -> _Bench:
 
 
 def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float) -> _Weighed | None:
-    """
-    Return the weight of a cause other than the one at work; None where it has none.
-
-    ratio: of its deviation to the noise, as it is given.
-    best: chi-square of the cause at work.
-    """
+    """Return the weight of another cause, ``ratio`` times the noise; None where it has none."""
     whole = moved(bench.cell, [*bench.beside, cause], bench.takes)
     if _one_number(cause):
         alone = (whole - bench.without)[:, None]

@@ -202,14 +202,12 @@ def judged(
     """
     Return what answers were worth on cases that nothing was learned from.
 
-    content: of the file of weights that they were reported by.
     rows: as `judged.kept` gives them; none where the cases learned from are judged by weights that
     had not seen them.
-    examples: what was reported.
     """
     own = [row for row in rows if row.get('examples')]
     foreign = {str(row['name']) for row in own if row['kind'] in NOT_IN_LIBRARY}
-    whole = _answers(examples)
+    whole = [e for e in examples if e.kind.startswith('answer')]
     groups = {
         **{kind: [e for e in examples if e.kind == kind] for kind in content['statements']},
         'answers as a whole': whole,
@@ -233,13 +231,10 @@ def judged(
     }
 
 
-def _answers(examples: Sequence[Example]) -> list[Example]:
-    return [e for e in examples if e.kind.startswith('answer')]
-
-
 def worth(examples: Sequence[Example]) -> dict[str, Any]:
     """Return how far what is told of some statements can be trusted."""
-    reported, right = probabilities_of(examples)
+    reported = np.array([e.reported for e in examples])
+    right = np.array([e.right for e in examples], bool)
     sure = [e.sure for e in examples]
     wrong = sum(e.sure and not e.right for e in examples)
     return {
@@ -253,11 +248,6 @@ def worth(examples: Sequence[Example]) -> dict[str, Any]:
         'sure_and_wrong_most_95': upper_limit(wrong, len(examples), 0.05),
         'wrong_at_70': _risk_at(reported, right),
     }
-
-
-def probabilities_of(examples: Sequence[Example]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return what was told of some statements, and which were right."""
-    return np.array([e.reported for e in examples]), np.array([e.right for e in examples], bool)
 
 
 def _risk_at(reported: Array, right: NDArray[np.bool_]) -> float:

@@ -144,14 +144,13 @@ def _members(diagnosis: Diagnosis, remaining: Any) -> list[list[dict[str, Any]]]
                 {
                     'effect': r.site.effect,
                     'joint': r.site.joint,
-                    'left': remaining(_for_one(diagnosis.model, r.fit.model)),
+                    'left': remaining(
+                        replace(
+                            r.fit.model, bases=r.fit.model.bases[:1], known=diagnosis.model.known
+                        )
+                    ),
                 }
                 for r in alternatives
             ]
         )
     return out
-
-
-def _for_one(model: Model, other: Model) -> Model:
-    """Return an alternative's model with the base of the first recording."""
-    return replace(other, bases=other.bases[:1], known=model.known)

@@ -27,7 +27,7 @@ from ..blind.blind_cell import BlindCell, Take, as_recording, deviation, exact, 
 from ..blind.cause_sizes import SIZES, Cause, Site, site
 from ..blind.making import SealedCase
 from ..plant.exponentials import PlantRecording
-from .levels_of_truth import Levels, alike_by_structure, levels_of
+from .levels_of_truth import alike_by_structure, levels_of
 
 STEP = 0.1
 """Share of a parameter by which it is changed for its column; angles by as much [rad]."""
@@ -168,7 +168,7 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
     whole = model.twin(0).poses(seen, t).position
     real = [shown(deviation(cell, [own], case.test)) for own in case.causes]
     sites = [site(own) for own in case.causes]
-    words = [_levels(case, own) for own in sites]
+    words = levels_of({'sites': sites, 'construction': None, 'robot': case.lot.robot})
 
     def part_of(told: Told) -> dict[str, float] | None:
         names = [] if told.rest else [(str(own.effect), own.joint) for own, _ in told.name]
@@ -202,11 +202,6 @@ def _kinds(case: SealedCase, names: Sequence[Site]) -> list[set[Site]]:
         set[Site]().union(*(each for kind, each in alike if kind in among))
         for among in (*kinds, {kind for kind, _ in alike})
     ]
-
-
-def _levels(case: SealedCase, own: Site) -> Levels:
-    truth = {'sites': [own], 'construction': None, 'robot': case.lot.robot}
-    return levels_of(truth)[0]
 
 
 def _listed(told: Sequence[tuple[Any, float]]) -> set[str]:

@@ -46,12 +46,7 @@ def smooth_motion(arm: Robot, count: int) -> Array:
 
 
 def links(robot: Robot) -> list[Array]:
-    """
-    Return the constant transforms between the joint axes, shape (4, 4) each, n + 1 of them.
-
-    The chain is ``links[0] Rz(q0) links[1] Rz(q1) ... links[n]``, which is how peers that know no
-    DH values are told of the arm.
-    """
+    """Return the constant transforms between joint axes, for ``links[0] Rz(q0) links[1] ...``."""
     out = [np.array(robot.T_world_base)]
     for i in range(robot.n):
         out.append(turn_z(robot.theta[i], robot.d[i]) @ turn_x(robot.alpha[i], robot.a[i]))

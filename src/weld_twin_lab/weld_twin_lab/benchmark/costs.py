@@ -36,8 +36,6 @@ def cost_of(
     The memory of this process does not count, however large it is: see `small_parent`, whose own
     ten megabytes are the least that can be told.
 
-    words: the program and its arguments.
-    environment: left out, that of this process.
     said: where what it prints goes, errors too; left out, nowhere.
     limit: after so long it is killed [s]; 0 for never.
     """

@@ -77,13 +77,7 @@ class Outcome:
 
 
 def race(workload: Workload, rounds: int, least: float) -> Outcome:
-    """
-    Time the contenders in turn.
-
-    least: how long each contender works in a round, in as many calls as that takes [s].
-
-    Raises DataError: a contender's result is not that of the others.
-    """
+    """Time contenders in turn, each so long a round [s]; raises DataError where their results differ."""
     for contender in workload.contenders:
         if not contender.gap <= workload.tolerance:
             raise DataError(

@@ -120,16 +120,13 @@ def measured(
     base: Path | None, out: Path, runs: int, only: Sequence[str], keep: Keep
 ) -> list[Entry]:
     """
-    Return what every job costs, here and in another checkout, in turn.
+    Return what every job costs, here and in another checkout with an environment of its own, in turn.
 
-    base: a checkout with an environment of its own in ``.venv``.
     out: gets the data and, for a moment, what the commands write.
     runs: pairs of runs after one to warm up; jobs that take long are run once.
     only: parts of the names of jobs; empty for all.
-    keep: given each entry as soon as it has been measured.
 
-    Raises DataError: there is no environment in ``base``, or no job has such a name, or a command
-    fails here.
+    Raises DataError: there is no environment in ``base``, no such job, or a command fails here.
     """
     pythons = {'here': sys.executable}
     if base is not None:

@@ -276,16 +276,7 @@ def at_stamps(made: PlantRecording, t: Array) -> Array:
 
 
 def floor(cell: BlindCell, causes: Sequence[Cause], taken: Take) -> tuple[float, list[int]]:
-    """
-    Return what is left of a recording when its causes are known, and its outliers.
-
-    Returns
-    -------
-    floor : float [m]
-        RMS of measured minus true position at the stamps, outliers left out.
-    outliers : list of int
-
-    """
+    """Return what is left when causes are known, RMS without outliers [m], and the outliers."""
     seen = record(cell, causes, taken)
     quiet = replace(cell.tracker, sigma=0.0, sigma_orientation=0.0, outlier_share=0.0)
     true = record(cell, causes, taken, quiet).position

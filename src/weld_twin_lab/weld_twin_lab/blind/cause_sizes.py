@@ -344,7 +344,7 @@ def _base_turn(robot: Robot, span: float, rng: np.random.Generator) -> Construct
     """Turn the base about the first axis."""
     base = robot.T_world_base
     turn = 5e-4 * float(rng.choice([-1.0, 1.0])) * base[:3, 2]
-    shift = base[:3, 3] - _turned_point(base[:3, 3], turn)
+    shift = base[:3, 3] - (base[:3, 3] + np.cross(turn, base[:3, 3]))
     cause = {'effect': 'base_pose', 'xyz': shift.tolist(), 'rotvec': turn.tolist()}
     return Construction([cause], [[('joint_offset', robot.joint_names[0])]])
 
@@ -378,10 +378,6 @@ CONSTRUCTIONS: dict[str, Callable[..., Construction]] = {
     'last axis': partial(_at_an_end, 'joint_offset', -1, 'tool_pose'),
     'pedestal': partial(_at_an_end, 'link_offset', 0, 'base_pose'),
 }
-
-
-def _turned_point(point: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    return point + np.cross(turn, point)
 
 
 def _linked(axes: np.ndarray, a: int, b: int) -> bool:

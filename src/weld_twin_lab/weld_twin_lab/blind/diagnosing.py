@@ -39,13 +39,10 @@ def diagnose_cases(
     """
     Diagnose all cases, write what was said, and return it case by case.
 
-    out: gets a diagnosis.json for every case, and the list of them.
     runner: its store makes the work resumable; verdicts of other cases are not taken for these.
-    allow_readable: go on although truths lie within reach.
-    with_holdout: give the diagnosis the held-out recording to judge its shrink on; without, it
-    judges on stretches of the training recording.
+    with_holdout: judge the shrink on the held-out recording, not on stretches of the training's.
 
-    Raises DataError: truths lie within reach, or the directory holds no cases.
+    Raises DataError: truths lie within reach and may not, or the directory holds no cases.
     """
     readable = _truths_readable(cases, allow_readable)
     listed = seal.read(cases / seal.CASES)

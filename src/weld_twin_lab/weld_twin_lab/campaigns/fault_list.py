@@ -28,6 +28,8 @@ LEASE = 25.0
 """Seconds after which the middleware has given up a participant that shows no sign of life."""
 LONG = 2.5
 """Seconds of a fault: at least two looks of every node at its health."""
+FAR = (2.0, 2.0, 2.0)
+"""Where no tool of the cell is [m]."""
 HOUR = 3600 * S
 """Nanoseconds."""
 
@@ -69,16 +71,8 @@ def _set(field: str, k: int, value: float, message: Any) -> None:
     getattr(message, field)[k] = value
 
 
-def _short(message: Any) -> None:
-    message.position = message.position[:4]
-
-
-def _renamed(message: Any) -> None:
-    message.name = [*message.name[:5], 'wrist_4_joint']
-
-
-def _degrees(message: Any) -> None:
-    message.position = np.degrees(message.position)
+def _with(field: str, change: Callable[[Any], Any], message: Any) -> None:
+    setattr(message, field, change(getattr(message, field)))
 
 
 def _shifted(ns: int, message: Any) -> None:
@@ -120,10 +114,6 @@ def _future(bench: Bench) -> None:
 
 def _rate(factor: float, bench: Bench) -> None:
     bench.run(LONG + 1.0, rate=RATE * factor)
-
-
-def _silence(bench: Bench) -> None:
-    bench.rest(LONG + 1.0)
 
 
 def _twice(change: float, bench: Bench) -> None:
@@ -195,22 +185,16 @@ def _beside(topic: Topic, make: Callable[[Bench, int], Any], bench: Bench) -> No
     bench.cell.node.destroy_publisher(publisher)
 
 
-def _nan_pose(bench: Bench, _: int) -> Any:
-    return bench.make.pose(bench.stamp + 1, np.array([0.1, np.nan, 0.0]), np.eye(3), 'world')
+def _pose(
+    place: Sequence[float], bench: Bench, _: int, *, frame: str = 'world', ahead: int = 0
+) -> Any:
+    return bench.make.pose(bench.stamp + ahead + 1, np.array(place), np.eye(3), frame)
 
 
 def _zero_pose(bench: Bench, _: int) -> Any:
-    message = bench.make.pose(bench.stamp + 1, np.zeros(3), np.eye(3), 'world')
+    message = _pose((0.0, 0.0, 0.0), bench, 0)
     message.pose.orientation.w = 0.0
     return message
-
-
-def _elsewhere(bench: Bench, _: int) -> Any:
-    return bench.make.pose(bench.stamp + 1, np.full(3, 2.0), np.eye(3), 'tracker')
-
-
-def _minute_ahead(bench: Bench, _: int) -> Any:
-    return bench.make.pose(bench.stamp + 60 * S + 1, np.full(3, 2.0), np.eye(3), 'world')
 
 
 def _other_type(bench: Bench) -> None:
@@ -235,10 +219,15 @@ JOINT_FAULTS = (
     Fault('NaN position', partial(_third, partial(_set, 'position', 2, float('nan')))),
     Fault('infinite position', partial(_third, partial(_set, 'position', 0, float('inf')))),
     Fault('infinite velocity', partial(_third, partial(_set, 'velocity', 1, float('-inf')))),
-    Fault('fewer positions than names', partial(_third, _short)),
-    Fault('a renamed joint', partial(_third, _renamed)),
+    Fault(
+        'fewer positions than names', partial(_third, partial(_with, 'position', lambda q: q[:4]))
+    ),
+    Fault(
+        'a renamed joint',
+        partial(_third, partial(_with, 'name', lambda n: [*n[:5], 'wrist_4_joint'])),
+    ),
     Fault("another robot's joints", _foreign),
-    Fault('degrees', partial(_third, _degrees)),
+    Fault('degrees', partial(_third, partial(_with, 'position', np.degrees))),
     Fault('stamp zero', partial(_third, _unset)),
     Fault('stamps that go back', partial(_third, partial(_shifted, -2 * S))),
     Fault('a stamp an hour ahead', _future),
@@ -248,7 +237,7 @@ JOINT_FAULTS = (
     Fault('a length of four thousand million', partial(_bytes, _promise)),
     Fault('ten times the rate', partial(_rate, 10.0)),
     Fault('a tenth of the rate', partial(_rate, 0.1)),
-    Fault('silence and return', _silence),
+    Fault('silence and return', lambda bench: bench.rest(LONG + 1.0)),
     Fault('a second publisher of the same', partial(_twice, 0.0)),
     Fault('a second publisher that differs', partial(_twice, 0.05)),
 )
@@ -256,7 +245,7 @@ JOINT_FAULTS = (
 OTHER_FAULTS = (
     Fault(
         'NaN in a measured pose',
-        partial(_beside, MEASURED_POSE, _nan_pose),
+        partial(_beside, MEASURED_POSE, partial(_pose, (0.1, np.nan, 0.0))),
         ('deviation_analyzer', 'deviation_markers', 'live_diagnosis'),
     ),
     Fault(
@@ -271,12 +260,12 @@ OTHER_FAULTS = (
     ),
     Fault(
         'measurements in another frame',
-        partial(_beside, MEASURED_POSE, _elsewhere),
+        partial(_beside, MEASURED_POSE, partial(_pose, FAR, frame='tracker')),
         ('deviation_analyzer', 'live_diagnosis'),
     ),
     Fault(
         'measurements a minute ahead of the others',
-        partial(_beside, MEASURED_POSE, _minute_ahead),
+        partial(_beside, MEASURED_POSE, partial(_pose, FAR, ahead=60 * S)),
         ('deviation_analyzer', 'live_diagnosis'),
     ),
     Fault('a publisher of another type', _other_type),

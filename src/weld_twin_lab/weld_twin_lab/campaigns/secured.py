@@ -51,15 +51,7 @@ LIBRARY = f'lib{MIDDLEWARE}.so'
 
 @contextmanager
 def secured_middleware(source: Path, work: Path) -> Iterator[None]:
-    """
-    Build a source and let this process and its children run on it, for a while.
-
-    source: folder with checkouts.
-    work: folder to build in; what was built there before is used again.
-
-    Raises TwinError: source, compiler, headers or the wheels of the build tools are missing, or it
-    does not build.
-    """
+    """Run on a source, built in a folder where it is not yet, for a while; raises TwinError."""
     install = work / 'install'
     if next(install.rglob(LIBRARY), None) is None:
         _refuse_unable(source)
@@ -153,14 +145,11 @@ def _environment(install: Path) -> Mapping[str, str]:
     library = next(install.rglob(LIBRARY), None)
     if library is None:
         raise TwinError(f"'{install}' has no {LIBRARY}; remove the folder and try again")
+    bundled = [place for root in map(Path, sys.path) for place in root.glob('ros_*.libs')]
     # The wheels look for a middleware among themselves alone; a library that is loaded is found.
-    own = [str(library.parent), f'{sys.prefix}/lib', *map(str, _bundled())]
+    own = [str(library.parent), f'{sys.prefix}/lib', *map(str, bundled)]
     made['LD_LIBRARY_PATH'] = os.pathsep.join(filter(None, [*own, made.get('LD_LIBRARY_PATH')]))
     return {**made, 'RMW_IMPLEMENTATION': MIDDLEWARE, 'LD_PRELOAD': str(library)}
-
-
-def _bundled() -> list[Path]:
-    return [place for root in map(Path, sys.path) for place in root.glob('ros_*.libs')]
 
 
 ABSENT = 3

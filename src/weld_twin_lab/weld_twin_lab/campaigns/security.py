@@ -93,13 +93,7 @@ def _locked(store: Path, name: str) -> dict[str, str]:
 
 
 def played(folder: Path, locked: list[dict[str, str]]) -> dict[str, Any]:
-    """
-    Return what each party heard, what was recorded of each, and what the nodes made of it.
-
-    locked: environments of the parties, the first one that of the nodes too; empty without keys.
-
-    Raises TwinError: a node does not run; the message has what it said.
-    """
+    """Return what each party, in its environment, heard, what was recorded of it, and of the nodes."""
     bag = folder / 'bag'
     words = {**WORDS, 'recorder': ['-p', f'out:={bag}']}
     cell = {name: _node(name, words.get(name, []), locked[0], folder) for name in MODULES}

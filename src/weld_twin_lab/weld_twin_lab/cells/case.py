@@ -75,7 +75,8 @@ def postures(robot: Robot, count: int, rng: np.random.Generator, swing: float = 
     """Return postures, shape (M, n) [rad or m]: arms about `READY`, all else wherever it reaches."""
     low, high = np.empty(robot.n), np.empty(robot.n)
     at = 0
-    for k in _outwards(robot):
+    # From the foot of each branch to its end.
+    for k in (*range(robot.behind)[::-1], *range(robot.behind, robot.n)):
         if robot.joint_names[k] in ('rail', 'tilt', 'turn'):
             low[k], high[k] = robot.lower[k], robot.upper[k]
             continue
@@ -84,11 +85,6 @@ def postures(robot: Robot, count: int, rng: np.random.Generator, swing: float = 
         high[k] = min(ready + swing, robot.upper[k])
         at += 1
     return np.asarray(rng.uniform(low, high, (count, robot.n)))
-
-
-def _outwards(robot: Robot) -> list[int]:
-    """Return the joints from the foot of each branch to its end."""
-    return [*range(robot.behind)[::-1], *range(robot.behind, robot.n)]
 
 
 def really(
@@ -101,10 +97,7 @@ def really(
     """
     Return the torch as the plant has it, seen from the workpiece where there is one.
 
-    data: the robot file.
-    names: joints in the order of ``q``.
-    causes: what is wrong, each with the joint that it is of.
-    q: shape (M, n) [rad or m].
+    names: joints in the order of the postures ``q``, shape (M, n) [rad or m].
     """
     arm = {key: value for key, value in data.items() if key != 'workpiece'}
     torch = _branch(arm, names, causes, q, rng)

@@ -83,13 +83,9 @@ def opened(cases: Path, truths: Path, out: Path) -> list[str]:
 
 def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
     """
-    Return the command of every method, with {case} and {out} in it.
+    Return the command of every entrant, and of others entered as NAME=COMMAND, with {case} and {out}.
 
-    names: of `ENTRANTS`.
-    entered: others, as NAME=COMMAND.
-
-    Raises DataError: there is no such entrant, or it cannot be loaded, or a command does not say
-    where case and answer go.
+    Raises DataError: there is no such entrant, it cannot be loaded, or a command lacks a place.
     """
     out: dict[str, list[str]] = {}
     for name in names:
@@ -119,27 +115,18 @@ def run_all(
     counts: Mapping[str, int],
     tell: Callable[[str], None],
 ) -> dict[str, dict[str, Run]]:
-    """
-    Return what every method said of every case, by method and case; all take turns.
-
-    A method that has been run on a case is not run again: ``out`` keeps what came of it.
-    """
+    """Return what every method said of every case; all take turns, and ``out`` keeps what came of it."""
     runs: dict[str, dict[str, Run]] = {method: {} for method in methods}
     for name in names:
         for method, words in methods.items():
             place = out / method / name
             if not (place / RUN).exists():
-                _start(words, cases / name, place)
+                shutil.rmtree(place, ignore_errors=True)
+                place.mkdir(parents=True)
+                write_json(place / RUN, ended(words, cases / name, place))
             runs[method][name] = _kept(place, counts[name])
         tell(name)
     return runs
-
-
-def _start(words: Sequence[str], case: Path, place: Path) -> None:
-    """Have a case answered, and keep what that took."""
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
-    write_json(place / RUN, ended(words, case, place))
 
 
 def _kept(place: Path, count: int) -> Run:
@@ -179,13 +166,10 @@ Errors = dict[str, dict[str, float]]
 
 def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     """
-    Write the cases of both arms; return what was measured where they ask, (M, 3) [m], by name.
+    Write the cases of both arms, or keep them; return what was measured where they ask, (M, 3) [m].
 
     Nobody measured base and tool frame; the nominal arm's are fitted on the stations of the case,
     the same for all methods. They are told as frames that are not known.
-
-    ur5, ur10: directories of the published tables; see docs/real_arms.md.
-    out: cases that are there already are left as they are.
 
     Raises DataError: a table is missing or cannot be read.
     """
@@ -255,13 +239,7 @@ def _millimetres(error: float | None, best: float) -> str:
 
 
 def page(table: str, errors: Errors, measured: Mapping[str, Array]) -> str:
-    """
-    Return the page in Markdown.
-
-    table: all methods on the sealed cases, as `scores.page` gives it.
-    errors: on the measured arms, as `arms.lefts` gives them; empty where these were not asked.
-    measured: what was measured there, shape (M, 3) [m].
-    """
+    """Return the page: the table of sealed cases, and errors on measured arms where these were asked."""
     parts = [f'## On sealed cases\n\n{table}']
     if errors:
         parts.append(_on_arms(errors, measured))

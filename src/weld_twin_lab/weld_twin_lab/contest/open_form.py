@@ -95,11 +95,8 @@ def write_case(
     folder: Path, robot: Path, recordings: tuple[Recording, Recording], said: Mapping[str, Any]
 ) -> None:
     """
-    Write a case.
+    Write a case into a new folder, by recordings to learn from and to be asked about.
 
-    folder: must not exist.
-    robot: robot file.
-    recordings: to learn from, and to be asked about; of the latter, positions are left out.
     said: ``align`` and ``exclude``; ``known``, the text of a file of effects, or empty.
     """
     folder.mkdir(parents=True)

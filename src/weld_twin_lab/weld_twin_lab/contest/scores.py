@@ -25,7 +25,7 @@ from . import course
 from .course import Run
 from .entrants import ENTRANTS
 from .entrants.geometry import never_knows
-from .open_form import Cause, ContestAnswer, Name, read_case
+from .open_form import ContestAnswer, Name, read_case
 
 DENSITY, APART = 1.0 / np.sqrt(2.0 * np.pi), 1.0 / np.sqrt(np.pi)
 """Of a normal distribution of unit width: its density in the middle, and half the mean distance of two
@@ -112,7 +112,8 @@ def point(answer: ContestAnswer, case: Sealed) -> Point:
     first = {(effect, joint) for effect, joint, _ in _first(answer, len(best))}
     family = {effect for effect, _ in best} <= {effect for effect, _ in first}
     joint = {at[1] for at in best} <= {at[1] for at in first}
-    gap = rms((case.positions - answer.predicted)[case.good])
+    off = (case.positions - answer.predicted)[case.good]
+    gap = rms(off)
     return Point(
         there if something else None,
         None if something else there,
@@ -122,24 +123,18 @@ def point(answer: ContestAnswer, case: Sealed) -> Point:
         _sure_wrong(answer, case),
         gap / case.nominal_m,
         gap / float(truth['floor_m']),
-        *_promises(answer, case),
+        *(() if answer.sigma is None else promised(off, answer.sigma[case.good])),
     )
-
-
-def _promises(answer: ContestAnswer, case: Sealed) -> tuple[float | None, ...]:
-    if answer.sigma is None:
-        return None, None, None
-    return promised((case.positions - answer.predicted)[case.good], answer.sigma[case.good])
 
 
 def _first(answer: ContestAnswer, count: int) -> list[Name]:
     """Return the names of so many causes, the likeliest, and of each the likeliest names."""
     ranked = sorted(answer.causes, key=lambda cause: -sum(p for *_, p in cause))
-    return [name for cause in ranked[:count] for name in _likely(cause)]
-
-
-def _likely(cause: Cause) -> list[Name]:
-    return sorted(cause, key=lambda name: -name[2])[:NAMES]
+    return [
+        name
+        for cause in ranked[:count]
+        for name in sorted(cause, key=lambda name: -name[2])[:NAMES]
+    ]
 
 
 def _names(answer: ContestAnswer) -> list[Name]:

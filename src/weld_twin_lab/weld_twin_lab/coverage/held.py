@@ -117,7 +117,7 @@ def oracle_sigma(
     case: SealedCase, pair: tuple[Recording, Recording], mask: NDArray[np.bool_]
 ) -> dict[str, float]:
     """
-    Return the median of the largest standard deviation of position [m], by two measures.
+    Return the median of the largest standard deviation of position [m], by two measures, or nothing.
 
     Least squares with the true causes and the true noise, on the recording that the diagnosis had.
     ``formal_sigma_m`` is its covariance alone, as if real gears and drives were no richer than the
@@ -126,13 +126,6 @@ def oracle_sigma(
     in ten can be narrower by the same model.
 
     pair: what is fitted, and the motion that is predicted, seen where the tool really is.
-    mask: poses of it that count, shape (M,).
-
-    Returns
-    -------
-    dict
-        Empty where a cause has no formula, or nothing was to be fitted.
-
     """
     train, other = pair
     cell = case.cell

@@ -108,13 +108,7 @@ def _splits(ur5: str, ur10: str) -> dict[str, Split]:
 
 
 def tasks_of(args: Any) -> list[Task]:
-    """
-    Return what is to be tried, in the order that it is told.
-
-    args: the options of the study.
-
-    Raises DataError: data are missing or cannot be read, or the simulator is not there.
-    """
+    """Return what is to be tried, in the order that it is told; raises DataError."""
     seed, asked = args.seed, list[tuple[str, Callable[..., Any], tuple[Any, ...]]]()
     for name in _splits(args.ur5, args.ur10) if args.ur5 else ():
         asked.append((name, _of_split, (args.ur5, args.ur10, name)))
@@ -199,7 +193,8 @@ def page(entries: Sequence[Entry]) -> str:
     """Return the summary, what became of other promises, and the table of every recording."""
     plans = [entry for entry in entries if 'promised_within' in entry]
     rest = [entry for entry in entries if 'source' in entry]
-    tables = [summary_table(rest), promise_table(rest), entry_table(rest)]
+    rows = [(entry, region) for entry in rest for region in REGIONS if region in entry]
+    tables = [tabled(SUMMARIES, summaries(rest)), promise_table(rest), tabled(ENTRIES, rows)]
     if plans:
         told = ', '.join(f'{key} {value:.3g}' for key, value in of_plans(plans).items())
         tables.insert(2, f'Plans carried out: {told}.\n')
@@ -289,15 +284,6 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
         'over_oracle': float(np.median(wider)) if wider else None,
         'over_formal': float(np.median(formal)) if formal else None,
     }
-
-
-def summary_table(entries: Sequence[Entry]) -> str:
-    return tabled(SUMMARIES, summaries(entries))
-
-
-def entry_table(entries: Sequence[Entry]) -> str:
-    rows = [(entry, region) for entry in entries for region in REGIONS if region in entry]
-    return tabled(ENTRIES, rows)
 
 
 def _share(value: float | None, digits: int = 0) -> str:

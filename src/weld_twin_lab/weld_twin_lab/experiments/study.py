@@ -94,13 +94,7 @@ def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
 
 
 def closing_page(cases: Sequence[Mapping[str, Any]]) -> str:
-    """
-    Return what was learned, and what it is worth on cells that it was not learned from.
-
-    cases: as `heard` takes them.
-
-    Raises DataError: none of them has two diagnoses of the same round.
-    """
+    """Return what was learned, and its worth on other cells; raises DataError without two diagnoses."""
     all_ = heard(cases)
     if not len(all_.right):
         raise DataError('none of the cells has two diagnoses of the same round; give other tables')
@@ -208,12 +202,8 @@ def investigated(
     seed: int, wanted: int, runner: Runner, tell: Callable[[str], None], *, minutes: float
 ) -> dict[str, Any]:
     """
-    Investigate sealed cells that poor motions leave open.
+    Investigate as many sealed cells as are wanted that poor motions leave open.
 
-    seed: decides the cells.
-    wanted: cells that poor motions leave open.
-    runner: keeps what came of every cell drawn.
-    tell: told how many were drawn.
     minutes: no further cells are begun after so long.
     """
     end = time.monotonic() + 60.0 * minutes

@@ -73,15 +73,8 @@ def answered(
     """
     Return the answer from the first recording and later ones, why it closes the question, and how.
 
+    How: what the two diagnoses were weighed by, and their worth; empty where there was one.
     limits: what the next experiment may take.
-
-    Returns
-    -------
-    diagnosis : mapping
-    why : str
-    heard : dict
-        What the two diagnoses were weighed by, and what they are worth; empty where there was one.
-
     """
     by_itself = not later or cell.seen_anew(later)
     asked = replace(limits, confirm=by_itself)
@@ -271,13 +264,7 @@ def _changed(robot: Robot, change: SetUpChange) -> Robot:
 
 
 def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
-    """
-    Return a motion as it stands in an experiment, as the controller runs it.
-
-    asked: 'static', 'joint_names', 't' [s], 'q' [rad or m].
-
-    Raises DataError: it names other joints than the robot's.
-    """
+    """Return a motion of an experiment as the controller runs it; raises DataError for other joints."""
     if list(asked['joint_names']) != list(robot.joint_names):
         raise DataError(f'the experiment is not for {robot.name}')
     t, q = np.array(asked['t'], dtype=float), np.array(asked['q'], dtype=float)

@@ -43,20 +43,11 @@ def score(
     truth: Mapping[str, float],
 ) -> dict[str, Any]:
     """
-    Return what a year of weekly looks came to.
+    Return what a year of weekly looks came to: its events, and the alarms for nothing.
 
     observations: of each check, in the order of time; day 0 is that of week 0.
-    year: the truth.
-    named: coordinates that a diagnosis has named as causes.
-    likely: coordinates that use can change.
-    joints: of the arm, the first joint first.
+    named, likely: coordinates that a diagnosis has named as causes, and that use can change.
     truth: values before anything happened.
-
-    Returns
-    -------
-    dict
-        'events', one entry each, and 'false', the alarms for nothing.
-
     """
     weeks = np.array(year.weeks, float)
     due = [_reached(observations, year.events, event, weeks) for event in year.events]

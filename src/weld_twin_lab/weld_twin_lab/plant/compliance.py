@@ -98,12 +98,7 @@ WEIGHT = 0.2
 
 
 def pull(causes: Causes, arm: Arm, q: np.ndarray) -> np.ndarray | None:
-    """
-    Return the pull of the hoses as a wrench on the tool, tool frame, (N, 6) [N, N m], or None.
-
-    causes: entries of hose_pull: hook [m] in the base frame, tension [N], length [m].
-    q: shape (N, n).
-    """
+    """Return the pull of the hoses as a wrench on the tool, tool frame, (N, 6) [N, N m], or None."""
     hoses = list(causes.of('hose_pull'))
     if not hoses:
         return None

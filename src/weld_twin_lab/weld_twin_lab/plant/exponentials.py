@@ -301,13 +301,7 @@ def home(arm: Arm, rows: Rows | None = None) -> Home:
 
 
 def flange(arm: Arm, at: Home, q: np.ndarray, wobble: np.ndarray | None = None) -> Motion:
-    """
-    Return the flange in the base frame.
-
-    q: shape (..., n) [rad or m].
-    wobble: lean of each axis about its `across` vector: a bearing that tilts as it turns, shape
-    (..., n) [rad].
-    """
+    """Return the flange in the base frame; wobble: how far each axis leans about its `across`."""
     total = identity()
     for i in range(len(arm.names)):
         if wobble is not None and np.any(wobble[..., i]):

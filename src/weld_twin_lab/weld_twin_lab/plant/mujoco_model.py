@@ -44,19 +44,10 @@ def follower() -> dict[str, Any]:
 
 def follow(q: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """
-    Return what makes a follower hinge pass through every sample of its course.
+    Return the force (N,) and first velocity by which a follower hinge passes all samples of a course.
 
-    q: course [rad or m], shape (N,).
-    step: [s]
-
-    Returns
-    -------
-    force : array, shape (N,)
-        Feed-forward of the second difference, which is what MuJoCo's integrator needs, and what
-        holds the spring of the servo.
-    velocity : float
-        To start with.
-
+    The force is the feed-forward of the second difference, which is what MuJoCo's integrator needs, and
+    what holds the spring of the servo.
     """
     acceleration = np.diff(q, 2, prepend=q[0], append=q[-1]) / step**2
     acceleration[0], acceleration[-1] = acceleration[1], acceleration[-2]
@@ -72,16 +63,10 @@ def simulate(
     pull: np.ndarray | None = None,
 ) -> np.ndarray:
     """
-    Return the joint positions at every step, the start included.
+    Return the joint positions at every step, the start included, shape (N, nv).
 
-    start, velocity: shape (nv,).
     force: generalised force held over the step that begins at each sample, shape (N, nv).
     pull: force and torque on each body at its centre of mass, world frame, shape (N, nbody, 6).
-
-    Returns
-    -------
-    array, shape (N, nv)
-
     """
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = start, velocity
@@ -154,7 +139,7 @@ def add_links(
             parent, f'link{i}', exponentials.compose(exponentials.inverse(before), pose)
         )
         before = pose
-        _add_mass(parent, robot, i, _reach(arm, i))
+        _add_mass(parent, robot, i, float(np.hypot(arm.rows.a[i], arm.rows.d[i])))
         bodies.append(parent)
     tool = _add_body(parent, 'tool', arm.tool)
     # the wrench acts at a body's centre of mass, so the tool needs one, at its tip
@@ -167,10 +152,6 @@ def add_links(
             load.mass * SMALL**2,
         )
     return bodies
-
-
-def _reach(arm: Arm, i: int) -> float:
-    return float(np.hypot(arm.rows.a[i], arm.rows.d[i]))
 
 
 def _add_body(parent: mujoco.MjsBody, name: str, pose: Motion) -> mujoco.MjsBody:

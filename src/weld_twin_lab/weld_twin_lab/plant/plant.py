@@ -144,14 +144,8 @@ def run(
 
     robot: a robot file, as docs/conventions.md has it.
     effects: the flaws, as in an effects file; also those that no library knows.
-    rng: source of everything random; the same seed gives the same recording.
     richness: how far the physics of servo, gap, spring and flywheel goes beyond the textbook form
     of the effect: 0 is the textbook, 1 a plausible machine.
-
-    Returns
-    -------
-    PlantRecording
-
     """
     if not 0.0 <= richness <= 3.0:
         raise ValueError(f'richness must be within 0 and 3, got {richness}')

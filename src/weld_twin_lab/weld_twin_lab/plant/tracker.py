@@ -100,16 +100,9 @@ def observe(
     tracker: Tracker, pose: Motion, sigma: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """
-    Return what the tracker reads of true poses.
+    Return positions (M, 3) [m] and quaternions (M, 4), or None, that the tracker reads of true poses.
 
-    pose: shape (M,).
     sigma: white noise of each coordinate, the tracker's and any other [m].
-
-    Returns
-    -------
-    position : array, shape (M, 3) [m]
-    quaternion : array, shape (M, 4) x y z w, or None
-
     """
     position = pose.position + sigma * rng.standard_normal(pose.position.shape)
     if tracker.outlier_share > 0.0:

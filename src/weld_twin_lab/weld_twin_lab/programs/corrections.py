@@ -135,7 +135,8 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
     except TwinError as error:
         return {'language': language, 'undrawn': str(error)}
     along = seam_driven(seam, seam.text)
-    diagnosis = _diagnosed(seam, along, seed)
+    known = effects_from_list(list(seam.cell.known), seam.robot)
+    diagnosis = diagnose(seam.recordings(along, seed), seam.robot, known=known)
     outcome = promised_and_true(seam, along, diagnosis)
     after = outcome.pop('text')
     asked = AskedModel(seam.robot, (), temperature=seam.temperature, seam=seam)
@@ -196,11 +197,6 @@ def _off(seam: SealedSeam, text: str, meant: Driven) -> tuple[float, float]:
     # What is promised is of the way, and not of the time that it takes.
     way = np.gradient(np.interp(at, along.clock, along.way))
     return float(np.sqrt(np.average(off**2, weights=way))), float(off.max())
-
-
-def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:
-    known = effects_from_list(list(seam.cell.known), seam.robot)
-    return diagnose(seam.recordings(along, seed), seam.robot, known=known)
 
 
 def _by_diagnosis(

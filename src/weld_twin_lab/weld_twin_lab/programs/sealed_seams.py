@@ -159,13 +159,7 @@ class SealedSeam:
 
 
 def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
-    """
-    Return a seam of a language.
-
-    seed, number: decide everything random in it.
-
-    Raises DataError: the causes dealt cannot be seen, or no seam drawn can be welded.
-    """
+    """Return a seam of a language; raises DataError where causes cannot be seen or nothing be welded."""
     rng = np.random.default_rng([seed, number, sorted(CELLS).index(language)])
     case = _dealt(language, seed, number, rng)
     warm = case.train.command.temperature

@@ -94,20 +94,13 @@ def borne_out(
     told: Set[str],
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
-    Return what unseen data say of every kind, and of every claim.
+    Return what unseen data say of every kind against all others, and of every claim.
+
+    Of a claim: against all other kinds there are, and against all others that are told.
 
     reported: what a diagnosis reports: shapes that are not straight are taken from it.
-    claims: kinds that are named, several where they are named as alike: those are taken out
-    together.
-    told: kinds that are told as likelier than not; each claim is held against these.
-
-    Returns
-    -------
-    kinds : dict of str to Borne
-        Each against all others.
-    claims : list of (Borne, Borne)
-        Each against all other kinds there are, and against all others that are told.
-
+    claims: kinds that are named; several that are named as alike are taken out together.
+    told: kinds that are told as likelier than not.
     """
     fitted, other = thinned(row.fitted), None if row.other is None else thinned(row.other)
     robot = _aligned(fitted, row)

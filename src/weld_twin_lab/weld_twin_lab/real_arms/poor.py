@@ -182,25 +182,15 @@ def _below(what: str, value: float, goal: float, blame: tuple[str, ...] = ()) ->
 
 
 def page(entries: Sequence[Entry], measured: Sequence[Measure]) -> str:
-    parts = [goal_table(measured), split_table(entries)]
-    parts += [axis_table(e) for e in entries if e['kind'] == 'servo_axis']
+    """Return measures, mean errors of splits [mm], and what models leave of the axis [µm RMS]."""
+    goals = [(m.what, m.goal, m.got, REACHED[m.reached]) for m in measured]
+    splits = [entry for entry in entries if entry['kind'] != 'servo_axis']
+    parts = [markdown.table(('measure', 'goal', 'got', ''), *goals), tabled(SPLITS, splits)]
+    for entry in entries:
+        if entry['kind'] == 'servo_axis':
+            rows = [(name, f'{1e6 * rms:.1f}') for name, rms in entry['rms_m'].items()]
+            parts.append(markdown.table(('model', 'left [µm RMS]'), *rows))
     return '\n'.join(parts)
-
-
-def goal_table(measures: Sequence[Measure]) -> str:
-    rows = [(m.what, m.goal, m.got, REACHED[m.reached]) for m in measures]
-    return markdown.table(('measure', 'goal', 'got', ''), *rows)
-
-
-def split_table(entries: Sequence[Entry]) -> str:
-    """Return one line per split: mean errors in mm."""
-    return tabled(SPLITS, [entry for entry in entries if entry['kind'] != 'servo_axis'])
-
-
-def axis_table(entry: Entry) -> str:
-    """Return what each model leaves of the servo axis, in µm RMS."""
-    rows = [(name, f'{1e6 * rms:.1f}') for name, rms in entry['rms_m'].items()]
-    return markdown.table(('model', 'left [µm RMS]'), *rows)
 
 
 def _name(entry: Entry) -> str:
@@ -230,11 +220,6 @@ def _ratio(region: str, key: str) -> Callable[[Entry], str]:
     return in_words
 
 
-def _share_flagged(entry: Entry) -> str:
-    share = _of(entry, 'outside', 'flagged')
-    return '' if share is None else f'{100 * share:.0f} %'
-
-
 def _verdict(entry: Entry) -> str:
     if entry['traceback']:
         return f'traceback: {entry["traceback"].strip().splitlines()[-1]}'
@@ -251,7 +236,9 @@ SPLITS: dict[str, Callable[[Entry], object]] = {
     'outside: frames': _mm('outside', 'frames'),
     'outside: product': _mm('outside', 'product'),
     'over frames': _ratio('outside', 'over_frames'),
-    'flagged': _share_flagged,
+    'flagged': lambda entry: (
+        '' if (share := _of(entry, 'outside', 'flagged')) is None else f'{100 * share:.0f} %'
+    ),
     'verdict': _verdict,
 }
 """Columns of the table of splits."""

@@ -234,13 +234,7 @@ def tracked(data: Path, name: str) -> Source:
 
 
 def servo(data: Path) -> Source:
-    """
-    Return a servo axis, one joint that slides: its reference, and what was measured on the load side.
-
-    Across the axis nothing was measured; those coordinates are zero.
-
-    Raises DataError: the file is missing or holds something else.
-    """
+    """Return a servo axis: reference, and what was measured along it, zero across; raises DataError."""
     path = data / 'emps' / 'DATA_EMPS.mat'
     if not path.is_file():
         raise DataError(f"'{path}' is missing; docs/transfer.md says where the data come from")

@@ -34,7 +34,9 @@ def sparse_regression(case: ContestCase) -> ContestAnswer:
     columns = _columns(case, case.train.joints, measured.t)
     asked = _columns(case, case.ask.joints, case.times)
     sizes = np.sqrt((columns**2).mean(axis=0)) + 1e-12
-    arm = np.repeat([_reach(case, case.train.joints, measured.t)], len(sizes))
+    # What a small turn is multiplied by: how far the tool is from the base.
+    places = nominal(case, case.train.joints, measured.t)
+    arm = np.repeat([rms(places - case.robot.T_world_base[:3, 3])], len(sizes))
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
         model = STLSQ(threshold=THRESHOLD, alpha=RIDGE, max_iter=30)
@@ -70,8 +72,3 @@ def _columns(case: ContestCase, motion: JointMotion, t: Array) -> Array:
         )
         out += [(pull * term[:, None]).ravel() for term in terms]
     return np.stack(out, axis=1)
-
-
-def _reach(case: ContestCase, motion: JointMotion, t: Array) -> float:
-    """Return how far the tool is from the base, RMS [m]: what a small turn is multiplied by."""
-    return rms(nominal(case, motion, t) - case.robot.T_world_base[:3, 3])

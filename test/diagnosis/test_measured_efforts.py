@@ -16,8 +16,8 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_core.recording import JointSignal
 from weld_twin_lab.plant.compliance import Compliant
 from weld_twin_lab.plant.exponentials import Command, arm_from
+from weld_twin_lab.plant.flaws import LIBRARY, causes_from
 from weld_twin_lab.plant.plant import run
-from weld_twin_lab.plant.textbook_effects import LIBRARY, causes_from
 from weld_twin_lab.plant.tracker import Tracker
 from weld_twin_msgs_py.bags import BagReader, read_recording, write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model

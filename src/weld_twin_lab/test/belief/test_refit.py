@@ -11,7 +11,7 @@ import pytest
 from weld_twin_core.diagnosis import calibration
 from weld_twin_core.diagnosis.calibration.weights import FILE
 from weld_twin_lab.belief import learning, study
-from weld_twin_lab.belief.rows import read_rows, write_rows
+from weld_twin_lab.belief.trial import read_rows, write_rows
 from weld_twin_nodes.cli.main import main
 
 KEPT = Path(__file__).parents[4] / 'docs/results/belief'

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plant_cells import UR5, dh_pose, dh_positions, record, stations, weave
 
-from weld_twin_lab.plant.textbook_effects import heated
+from weld_twin_lab.plant.flaws import heated
 
 
 def _shifted(command, joint, delta):

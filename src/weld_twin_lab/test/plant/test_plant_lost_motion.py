@@ -5,8 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_lab.plant.flaws import Here, frame, known, on_joints
-from weld_twin_lab.plant.textbook_effects import Causes
+from weld_twin_lab.plant.flaws import Causes, Here, frame, known, on_joints
 
 JOINTS = ('j0', 'j1')
 

@@ -4,6 +4,9 @@
 What an engine says of cells with one to six causes, kept as a small table and scored.
 
 The table holds answers alone, so that engines are compared case by case, whatever their code.
+
+More data never hurts: a cause that was sure and right stays so with another recording, and no
+answer hangs on which recording was given first. Cells that grow tell.
 """
 
 from __future__ import annotations
@@ -31,8 +34,7 @@ from ..study import Study, require_simulator, tabled
 from .levels_of_truth import Levels, alike_by_structure, levels_of, whole
 from .mix import MOST as CAUSES
 from .mix import SEVERAL, SPANS, drawn
-from .rows import read_rows, rounded, write_rows
-from .trial import diagnosed, recordings_of, said, tried
+from .trial import diagnosed, read_rows, recordings_of, rounded, said, tried, write_rows
 
 MOST = 2 * CAUSES
 """Effects of a model that are kept; more are many small errors."""

@@ -1,6 +1,24 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Weights of the calibration fitted to examples, and from where on a statement is sure."""
+"""
+Weights of the calibration fitted to examples, and from where on a statement is sure.
+
+Weights are logistic regression with a ridge, bounded on one side of zero where a sign is good or bad
+news: chance in a few hundred cases may not turn it round.
+
+What is sure is told by conformal risk control [1]_: of N cases that took no part in the fit, the lowest
+threshold is taken at which (wrong and sure + 1) / (N + 1) stays below the risk. One more case,
+exchangeable with these, is then sure and wrong with at most that probability. How far the share itself
+may be off is told by the exact binomial limit [2]_.
+
+References
+----------
+.. [1] A. Angelopoulos, S. Bates, A. Fisch, L. Lei, T. Schuster, "Conformal risk control", ICLR
+   2024.
+.. [2] C. Clopper, E. Pearson, "The use of confidence or fiducial limits illustrated in the case
+   of the binomial", Biometrika 26, 1934.
+
+"""
 
 from __future__ import annotations
 

@@ -34,8 +34,7 @@ from .judged import Example, examples_of, kept
 from .learning import log_loss, unseen, upper_limit
 from .mix import USUAL
 from .oracle import certainty
-from .rows import read_rows, seeds_of, write_rows
-from .trial import tried
+from .trial import read_rows, seeds_of, tried, write_rows
 
 Kept = Mapping[str, Any]
 SEEN, PLAIN = 1.0, 3.0

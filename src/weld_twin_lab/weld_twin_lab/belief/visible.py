@@ -6,6 +6,10 @@ Which causes of a case show at all, and what share of the gap each has, by the p
 A cause is taken out of the truth; all others and the frames may then change so that the
 recordings look as they did. What still differs, there and on another motion, shows. On the
 recordings too: a fit that has to reach far beyond them differs elsewhere for no cause.
+
+Where an arm is off by a little everywhere, every name is at work. So a cause is asked how far it says
+that it moves the tool on a motion that was not recorded, beside what fitted frames take up, and how
+much of that the errors named really do.
 """
 
 from __future__ import annotations

@@ -1,6 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What may be wrong with a cell: every cause with a typical size, and how its size is changed."""
+"""
+What may be wrong with a cell: every cause with a typical size, and how its size is changed.
+
+Some causes no measurement, or not this one, can tell from another: each construction gives the causes
+at work and every answer that is as right as the truth.
+"""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@
 A middleware with DDS security, built from its source on the ROS there is; tools that make keys too.
 
 The wheels of Fast DDS have no security. Debian's Cyclone DDS has, but the package that joins it to
-ROS, ``rmw_cyclonedds_cpp``, comes as source alone, and so does ``sros2``, which makes the keys.
+ROS, ``rmw_cyclonedds_cpp``, comes as source alone, and so does ``sros2``, which makes the
+keys: run as a module with a folder, a policy and enclaves, a process of its own sees what was built.
 """
 
 from __future__ import annotations

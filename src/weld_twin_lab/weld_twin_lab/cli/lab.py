@@ -311,7 +311,7 @@ PROOFS = {
         OUT,
     ),
     'efforts': _proof(
-        'real_arms.by_effort:run',
+        'real_arms.unseen:run',
         """Do springs by measured efforts predict a real arm better than springs by the model's statics?
 
         Leaves out stretches of time in turn, diagnoses the rest with and without efforts, and judges

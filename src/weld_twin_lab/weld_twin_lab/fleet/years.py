@@ -1,6 +1,13 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The study of years: what it runs, what it comes to, and its page."""
+"""
+The study of years: what it runs, what it comes to, and its page.
+
+In drawn years, two checks of every cell are simulated by the plant and diagnosed by the command. Each
+week's values are then what such a diagnosis says of the arm as it is that week, its noise drawn anew.
+So two hundred years cost as much as two dozen diagnoses; what a diagnosis gets wrong of itself is in
+the years that are diagnosed in full, whose every check is simulated and diagnosed.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,14 @@ What gives between motors and links, at rest: gear play and joint springs.
 A spring is in equilibrium with the load torque of the pose it sags to; gravity pulls the link
 down, so a positive compliance sags. A gap follows the textbook play. The same arm in motion is
 in `tree`.
+
+A hose goes straight from its hook, fixed to the base, to the flange. Its balancer gives it the stated
+tension at the stated length, and a little more where it is drawn out further. Half of its own weight
+hangs at the flange.
+
+A pedestal can turn about the base's x, then about its y, on two springs. MuJoCo tells what weighs on
+these hinges, and the lean is where springs and weights are in balance, at the posture leaned already.
+Springs harden, and a moving arm shakes its pedestal as well: both by the richness.
 """
 
 from functools import cached_property
@@ -16,7 +24,7 @@ from scipy.interpolate import CubicSpline
 
 from . import exponentials, mujoco_model
 from .exponentials import Arm, Entry, Motion
-from .textbook_effects import Causes
+from .flaws import Causes
 
 HARDENING = 0.03
 """Share of a spring's stiffness gained from no load to the rated one."""

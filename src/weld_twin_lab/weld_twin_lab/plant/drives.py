@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 
 from . import mujoco_model
 from .exponentials import Course, Entry
-from .textbook_effects import Causes
+from .flaws import Causes
 
 STEP = 5e-4
 """Step [s] of the simulation; a flywheel of 50 Hz gets forty to a period."""

@@ -6,6 +6,9 @@ Geometry of the arm by product of exponentials.
 The DH rows of the robot file are read once, to place the joint axes at the home position (all
 joints at zero). From there on the arm is its screws and its home pose:
 T(q) = exp(S_1 q_1) ... exp(S_n q_n) M. Brockett 1984; Lynch and Park, chapter 4.
+
+A motion is a pair (rotation, position); a screw is a pair (omega, v) with omega a unit vector
+(turning) or zero (sliding), batched over leading axes. Lynch and Park, section 3.3.3.
 """
 
 from collections.abc import Mapping

@@ -3,8 +3,8 @@
 """
 The plant: the cell as it really is, standing in for one on the shop floor.
 
-Order of things: command -> servo and flywheel (`drives`) -> gearing (`effects`) -> gap and spring
-under load (`tree`, `compliance`) -> geometry as built (`geometry`) -> tool under load ->
+Order of things: command -> servo and flywheel (`drives`) -> gearing (`flaws`) -> gap and spring
+under load (`tree`, `compliance`) -> geometry as built (`exponentials`) -> tool under load ->
 instrument and clocks (`tracker`). Nothing here is shared with the twin that is to diagnose it.
 """
 
@@ -18,12 +18,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from . import compliance, drives, exponentials, flaws, mujoco_model, tree
-from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant, Pedestal
 from .exponentials import Arm, Command, Course, Entry, Motion, PlantRecording
-from .flaws import Here
-from .textbook_effects import Causes
+from .flaws import Causes, Here
 from .tracker import Tracker
 
 KNOWN = flaws.known()
@@ -67,7 +65,7 @@ class _Cell:
     def geared(self) -> np.ndarray:
         """The positions behind the gears at these instants, shape (N, n)."""
         motor = self.course.q(self.grid) + (0.0 if self.lost is None else self.lost(self.grid))
-        return np.asarray(motor + library.gearing(self.causes, motor))
+        return np.asarray(motor + flaws.gearing(self.causes, motor))
 
     @cached_property
     def pull(self) -> np.ndarray | None:
@@ -124,7 +122,7 @@ class _Cell:
             return exponentials.identity()
         command = self.course.command
         if command.static:
-            q = command.q + library.gearing(self.causes, command.q)
+            q = command.q + flaws.gearing(self.causes, command.q)
             at = np.searchsorted(command.t, t)
             return self.pedestal.at_rest(q[at], self.course.wrench(t))
         motor = CubicSpline(self.grid, self.geared)
@@ -163,7 +161,7 @@ def _cell(described: str, command: Command, richness: float) -> _Cell:
         raise ValueError(
             f'the command moves {command.q.shape[1]} joints, the robot has {len(arm.names)}'
         )
-    causes = library.causes_from(effects, arm, KNOWN)
+    causes = flaws.causes_from(effects, arm, KNOWN)
     return _Cell(robot, arm, causes, Course(command), richness)
 
 
@@ -205,8 +203,8 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
     """Return the tool as the measuring frame has it at true times (M,) [s], free of noise."""
     q, motor = _link_side(cell, t, rng)
     causes, arm, since = cell.causes, cell.arm, t - cell.start
-    rows = library.rows_as_built(causes, arm, since, cell.course.temperature(t))
-    base, tool = library.frames(causes, arm)
+    rows = flaws.rows_as_built(causes, arm, since, cell.course.temperature(t))
+    base, tool = flaws.frames(causes, arm)
     here = cell.here(t, motor, rng, wrench=cell.course.wrench(t))
     lean = flaws.on_joints(here, 'axis')
     base = exponentials.compose(base, flaws.frame('base', here), cell.leaned(t))
@@ -215,8 +213,8 @@ def true_poses(cell: _Cell, t: np.ndarray, rng: np.random.Generator) -> Motion:
         arm, exponentials.home(arm, rows), q, lean if lean.any() else None
     )
     pose = exponentials.compose(base, flange, tool)
-    pose = library.yielding(causes, pose, here.wrench)
-    return library.measured(causes, flaws.seen(here, pose, 'hand', 'stand', 'sight'), since)
+    pose = flaws.yielding(causes, pose, here.wrench)
+    return flaws.measured(causes, flaws.seen(here, pose, 'hand', 'stand', 'sight'), since)
 
 
 def _link_side(
@@ -224,8 +222,8 @@ def _link_side(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the links' and the motors' positions at times t, each (M, n)."""
     motor = cell.course.q(t) + (0.0 if cell.lost is None else cell.lost(t))
-    geared = motor + library.gearing(cell.causes, motor)
-    rounding = library.rounding(cell.causes, motor)
+    geared = motor + flaws.gearing(cell.causes, motor)
+    rounding = flaws.rounding(cell.causes, motor)
     give: np.ndarray | float
     if cell.course.command.static:
         give = _at_rest(cell, rng)[np.searchsorted(cell.course.command.t, t)]
@@ -237,7 +235,7 @@ def _link_side(
 def _at_rest(cell: _Cell, rng: np.random.Generator) -> np.ndarray:
     """Return what gives at every station, in the order they are visited, shape (N, n)."""
     command, compliant = cell.course.command, cell.compliant
-    q = command.q + library.gearing(cell.causes, command.q)
+    q = command.q + flaws.gearing(cell.causes, command.q)
     wrench = cell.with_hoses(q, command.wrench)
     give = np.zeros_like(q) if compliant.rigid else compliant.at_rest(q, wrench)
     torque = partial(compliant.torque, q, wrench)

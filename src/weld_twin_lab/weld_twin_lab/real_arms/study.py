@@ -21,7 +21,7 @@ from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.task_pool import Task
 
 from ..belief.learning import NAMES
-from ..belief.rows import write_rows
+from ..belief.trial import write_rows
 from ..blind.displacement import rms
 from ..study import Study, head, tabled
 from . import poor

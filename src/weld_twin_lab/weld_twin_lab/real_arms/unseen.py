@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import re
 import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,9 +27,18 @@ from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import spreads
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.posterior import Posterior
+from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.files.input_files import hashed
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.tables import read_table
+from weld_twin_report.report.diagnosis_files import RESULT, write_results
+
+from ..study import Study
+from .sources import alone
 
 ALIGN = frozenset({'base', 'tool'})
 GEOMETRY = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
@@ -123,3 +134,101 @@ _BEFORE = re.compile(r'(?<=File ").*?(?=(?:weld_twin_\w+|site-packages)/)')
 def traceback_text() -> str:
     """Return the traceback of the exception being handled, files as from their package on."""
     return _BEFORE.sub('', traceback.format_exc())
+
+
+WAYS = ('frames', 'geometry', 'statics', 'efforts')
+"""Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """One stretch of time that was not fitted."""
+
+    away: dict[str, Array]
+    """Distance of measured from predicted, for each of `WAYS`, shape (M,) [m]."""
+    names: tuple[str, ...]
+    """What was found with efforts, one text each."""
+
+
+def folds(
+    recording: Recording, robot: Robot, count: int, tell: Callable[[str], None]
+) -> list[Fold]:
+    """
+    Return every stretch predicted by models of all the others.
+
+    recording: stations with measured poses and efforts.
+    count: stretches, of equal numbers of stations in the order of time.
+    tell: told of each fold that is done.
+
+    Raises DataError: no efforts, no measurements, or no stations.
+    """
+    if recording.effort is None or recording.measured is None or not recording.joints.static:
+        raise DataError(f'{recording.name} needs stations with measured poses and efforts')
+    rows = np.arange(recording.joints.t.size)
+    out = []
+    for rows_out in np.array_split(rows, count):
+        train, test = (alone(recording, part) for part in (np.setdiff1d(rows, rows_out), rows_out))
+        plain = replace(train, effort=None)
+        by_efforts = diagnose(train, robot, align=ALIGN, experiment=False).model
+        models: dict[str, Model] = {
+            'frames': plain_fit(plain, robot, PLAIN['frames'], ALIGN),
+            'geometry': plain_fit(plain, robot, PLAIN['geometry'], ALIGN),
+            'statics': diagnose(plain, robot, align=ALIGN, experiment=False).model,
+            'efforts': by_efforts,
+        }
+        away = {
+            name: np.linalg.norm(residual(model, train, test)[:3], axis=0)
+            for name, model in models.items()
+        }
+        names = tuple(f'{e.name} of {e.site}' if e.site else e.name for e in by_efforts.found)
+        out.append(Fold(away, names))
+        tell(f'stretch {len(out)} of {count}: efforts {away["efforts"].mean() * 1e3:.3f} mm')
+    return out
+
+
+def table(name: str, done: Sequence[Fold]) -> str:
+    """Return means and maxima of all stretches as a page of Markdown."""
+    each = {way: np.concatenate([fold.away[way] for fold in done]) for way in WAYS}
+    start = float(each['frames'].mean())
+    words = {
+        'frames': 'frames alone, plain fit',
+        'geometry': 'frames and geometry, plain fit',
+        'statics': "diagnosis, springs by the model's statics",
+        'efforts': 'diagnosis, springs by measured efforts (`--use-effort`)',
+    }
+    lines = [
+        f'# Springs by measured efforts: {len(each["frames"])} {name}',
+        '',
+        f'Position on stations that were not fitted, {len(done)} stretches of time left out in turn.',
+        '',
+        markdown.table(
+            ('model', 'mean mm', 'max mm', 'mean over frames alone'),
+            *(
+                (
+                    words[way],
+                    f'{away.mean() * 1e3:.3f}',
+                    f'{away.max() * 1e3:.3f}',
+                    f'{away.mean() / start:.3f}',
+                )
+                for way, away in each.items()
+            ),
+        ),
+        'Found with efforts, stretch by stretch:',
+        '',
+        *(f'* {", ".join(fold.names) or "nothing"}' for fold in done),
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def run(study: Study) -> None:
+    args = study.args
+    if args.folds < 2:
+        raise ModelError(f'--folds {args.folds}: give two stretches or more')
+    robot = args.load_robot()
+    recording = read_table(args.table, robot).recording
+    with args.output(RESULT) as place:
+        page = table(recording.name, folds(recording, robot, args.folds, study.tell))
+        write_text(place / 'efforts.md', page)
+        whole = diagnose(recording, robot, align=ALIGN)
+        write_results(place, whole, [hashed('recording', args.table)], args.find_urdf())
+    print(page, end='')

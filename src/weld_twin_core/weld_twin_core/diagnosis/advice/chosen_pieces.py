@@ -10,12 +10,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...arrays import Array
-from ...effects.effect import Effect
 from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import STAY, Candidate
 from .postures import Limits, joined
-from .separation import Parting, Side, partings
+from .separation import Explanation, Parting, Side, partings
 
 DECIDES = 6.0
 """Standard deviations from which a measurement decides between two explanations."""
@@ -132,7 +131,7 @@ class Plan:
 def planned(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[tuple[Effect, ...]],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     limits: Limits,
     option: Candidate,

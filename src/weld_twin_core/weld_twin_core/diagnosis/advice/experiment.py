@@ -19,13 +19,12 @@ from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, candidates
 from .chosen_pieces import Plan, planned, widening
 from .postures import Limits
-from .separation import at_hand
+from .separation import Explanation, at_hand
 
 _WORTH = 0.8
 """A cheaper measurement is taken when it decides this share of what the best one does."""
 _NEAR = 0.5
 """Minutes within which measurements take equally long."""
-_Explanation = tuple[Effect, ...]
 _MOST_KNOTS = 40
 """Knots of a curve that is carried on over the whole range of an experiment."""
 _PACE = 0.1
@@ -35,7 +34,7 @@ _PACE = 0.1
 def next_experiment(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[_Explanation],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     limits: Limits | None = None,
     *,
@@ -109,7 +108,7 @@ def confirming(
 def _plans(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[_Explanation],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     limits: Limits,
     options: Sequence[Candidate],
@@ -148,7 +147,7 @@ _NARROW = (
 )
 
 
-def _comparison(plan: Plan, alternatives: Sequence[_Explanation], model: Model) -> dict[str, Any]:
+def _comparison(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict[str, Any]:
     one, other = _apart(alternatives[0], alternatives[plan.other])
     names = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
@@ -158,7 +157,7 @@ def _comparison(plan: Plan, alternatives: Sequence[_Explanation], model: Model) 
     return _entry(plan, reason, model, [_side(one), _side(other)])
 
 
-def _outside(first: _Explanation, second: _Explanation) -> dict[str, Any]:
+def _outside(first: Explanation, second: Explanation) -> dict[str, Any]:
     """Return what to do when no motion of the joints separates two explanations."""
     one, other = _apart(first, second)
     names = [_named(*pair) or 'nothing more' for pair in ((one, other), (other, one))]
@@ -174,7 +173,7 @@ def _outside(first: _Explanation, second: _Explanation) -> dict[str, Any]:
     }
 
 
-def _apart(first: _Explanation, second: _Explanation) -> tuple[list[Effect], list[Effect]]:
+def _apart(first: Explanation, second: Explanation) -> tuple[list[Effect], list[Effect]]:
     """Return the effects of each of two explanations that the other has not."""
     one, other = ({(e.key, e.on) for e in effects} for effects in (first, second))
     return [e for e in first if (e.key, e.on) not in other], [

@@ -36,6 +36,7 @@ from ..algebra.motions import plain_causes
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from .experiment import motion_entry
 from .postures import widened
+from .separation import Explanation
 
 _ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
@@ -273,7 +274,7 @@ _MOVING = 10.0
 
 
 def next_touches(
-    problem: Problem, model: Model, alternatives: Sequence[tuple[Effect, ...]], scale: Scale
+    problem: Problem, model: Model, alternatives: Sequence[Explanation], scale: Scale
 ) -> dict[str, Any] | None:
     """
     Return the touches to make next, as plain numbers and strings; None where none can be reached.
@@ -343,7 +344,7 @@ def _touchable(
 
 
 def _unknowns(
-    problem: Problem, model: Model, alternatives: Sequence[tuple[Effect, ...]]
+    problem: Problem, model: Model, alternatives: Sequence[Explanation]
 ) -> tuple[list[Effect], set[tuple[str, ...]] | None]:
     """Return the errors that take part, and the keys of those that explanations differ in."""
     view = problem.features(model)[0].view

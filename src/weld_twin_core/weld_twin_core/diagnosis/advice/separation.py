@@ -38,8 +38,7 @@ _SAMPLES = 120
 """Samples of a path that are computed; neighbours of a moving arm say the same."""
 _EVERY = 0.15
 """Time [s] after which a moving arm says something new: in it the arm moves by centimetres."""
-
-_Alternative = tuple[Effect, ...]
+Explanation = tuple[Effect, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +98,7 @@ def _remainder(matrices: Array) -> Array:
 def partings(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[_Alternative],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     candidate: Candidate,
     now: Side,
@@ -147,7 +146,7 @@ def _stacked(side: Side, true: int, alternative: int, names: list[str]) -> Array
 
 
 def at_hand(
-    problem: Problem, model: Model, alternatives: Sequence[_Alternative], scale: Scale
+    problem: Problem, model: Model, alternatives: Sequence[Explanation], scale: Scale
 ) -> Side:
     """Return what explanations say of the data at hand; everything is taken about the model."""
     few = problem.thinned(_ROWS)
@@ -158,7 +157,7 @@ def _ahead(
     problem: Problem,
     candidate: Candidate,
     recording: Recording,
-    alternatives: Sequence[_Alternative],
+    alternatives: Sequence[Explanation],
     scale: Scale,
 ) -> Side:
     """Return what the alternatives say of one recording of a candidate."""
@@ -183,7 +182,7 @@ def _ahead(
 
 
 def _side(
-    problem: Problem, model: Model, alternatives: Sequence[_Alternative], scale: Scale, mark: str
+    problem: Problem, model: Model, alternatives: Sequence[Explanation], scale: Scale, mark: str
 ) -> Side:
     predicted, columns, names = [], [], []
     for effects in alternatives:

@@ -29,21 +29,16 @@ def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
     before, was = _of(problem, result.baseline.model)
     after, now = _of(problem, result.final.model)
     held = _held_out(unseen)
+    three = before, after, held
     touched = tuple(
-        Touched(
-            label,
-            before[label].size,
-            *(float(each[label].mean()) for each in (before, after, held)),
-        )
+        Touched(label, before[label].size, *(float(each[label].mean()) for each in three))
         for label in before
     )
     known = tuple(
         KnownLength(a.tie.between, a.tie.kind, a.tie.value, a.tie.sigma, a.measured, b.measured)
         for a, b in zip(was, now, strict=True)
     )
-    was_m, now_m, held_m = (
-        float(np.concatenate(list(each.values())).mean()) for each in (before, after, held)
-    )
+    was_m, now_m, held_m = (float(np.concatenate([*own.values()]).mean()) for own in three)
     return ContactResult(was_m, now_m, held_m, touched, known, _not_seen(result))
 
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects import REGISTRY
-from ...effects.effect import Effect
 from ..advice.chosen_pieces import DECIDES
 from ..advice.experiment import confirming, extended, next_experiment
 from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
+from ..advice.separation import Explanation
 from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
@@ -46,8 +46,6 @@ _ALTERNATIVES = 2
 """Other places or dependences that are compared with the one that fits best."""
 _ROWS = 2000
 """Rows that an alternative's curves are fitted on: only its shape counts."""
-
-_Explanation = tuple[Effect, ...]
 
 
 def next_step(
@@ -127,7 +125,7 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     return parted * max(believed, 0.0 if named else _EVEN)
 
 
-def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:
+def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[Explanation]:
     """Return the explanations with an alternative in an effect's place: those named, or the others."""
     sites = {site for group in verdict.sets for site in group}
     own = result.small.model.found
@@ -142,7 +140,7 @@ def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Ef
     return [effects for effects in fits if effects != own]
 
 
-def _beside(result: Search) -> list[tuple[Effect, ...]]:
+def _beside(result: Search) -> list[Explanation]:
     """Return the explanations with one effect more, those first that come nearest to be needed."""
     model = result.small.model
     ranked = result.work.ranked(result.small, result.effective(result.small))
@@ -153,7 +151,7 @@ def _beside(result: Search) -> list[tuple[Effect, ...]]:
 
 def _without_names(
     result: Search, alternative: Curved | None, low: Array, high: Array
-) -> list[_Explanation]:
+) -> list[Explanation]:
     """Return the free-form explanation and those nearest; curves go on from low to high."""
     if alternative is None:
         return []
@@ -184,7 +182,7 @@ def _others(parts: Sequence[Part]) -> list[Group]:
     return out[:_ALTERNATIVES]
 
 
-def _fitted(result: Search, effects: _Explanation) -> _Explanation:
+def _fitted(result: Search, effects: Explanation) -> Explanation:
     few = result.problem.thinned(_ROWS)
     scale = replace(result.scale, weights=tuple(np.ones(m) for m in few.samples))
     return fit(few, result.final.model.with_found(effects), scale, None, 3).model.found

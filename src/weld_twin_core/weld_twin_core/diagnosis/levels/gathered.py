@@ -148,15 +148,10 @@ def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
     normal, right, sizes = (np.sum(parts, axis=0) for parts in zip(*sums, strict=True))
     whole = _shared_out(normal.sum(axis=0), right.sum(axis=0))
     error = _errors(normal, right)
-    names = model.robot.joint_names
-    return [
-        Scatter(
-            joint,
-            float(whole[at] * sizes[at] / sizes[-1]),
-            float(whole[at] / max(error[at], EMPTY)),
-        )
-        for at, joint in enumerate(names, start=whole.size - len(names))
-    ]
+    shares, steady = whole * sizes[:-1] / sizes[-1], whole / np.maximum(error, EMPTY)
+    joints = slice(-model.robot.n, None)  # the last of the ways
+    own = shares[joints].tolist(), steady[joints].tolist()
+    return [Scatter(*each) for each in zip(model.robot.joint_names, *own, strict=True)]
 
 
 def _ways(maker: Features) -> Array:

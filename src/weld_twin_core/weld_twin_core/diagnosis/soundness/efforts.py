@@ -131,11 +131,10 @@ def _sign(result: Efforts) -> Finding:
             f'Springs take the measured efforts as {meaning}, and nothing confirms that: with '
             f'gravity on the links they correlate by {result.correlation:.2f}.'
         )
-    sentence = (
+    return note(
         f'Springs take the measured efforts as {meaning}: so taken they correlate by '
         f'{result.correlation:.2f} with gravity on the links.'
     )
-    return note(sentence)
 
 
 def _causes_in_words(result: Efforts) -> str:
@@ -172,14 +171,12 @@ def _of_one(recording: Recording, robot: Robot) -> tuple[Array, ...]:
     motion = recording.joints
     expected = with_expected_effort(recording, robot, recording.load_of_effort).effort
     assert expected is not None and recording.effort is not None
-    at = spread_over(motion.t.size, 2 * SAMPLES)
-    sign = recording.load_of_effort
+    at, sign = spread_over(motion.t.size, 2 * SAMPLES), recording.load_of_effort
     measured = sign * recording.effort.at(motion.t[at]).T
     chain = frames(robot, motion.q[at])
     centred = payload_torque(robot, chain, 1.0, np.zeros(3))
     levers = [payload_torque(robot, chain, 1.0, axis) - centred for axis in np.eye(3)]
-    one = np.ones_like(measured)
-    beside = [one]
+    beside = [np.ones_like(measured)]
     if not motion.static:
         speed = motion.velocity[at].T
         beside += [np.tanh(speed / AT_REST), speed]

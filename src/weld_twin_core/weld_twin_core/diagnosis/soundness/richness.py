@@ -92,28 +92,22 @@ def _frames(case: Case) -> Iterator[Finding]:
 
 def quantity(case: Case) -> Sequence[Finding]:
     """Return a note on few stations; DataError for fewer numbers than frames have, or no motion."""
-    problem = case.problem
+    problem, total = case.problem, sum(case.problem.samples)
     frames = 6 * (len(case.recordings) if 'base' in problem.align else 0)
     frames += (6 if max(problem.rows) == 6 else 3) if 'tool' in problem.align else 0
-    if problem.size <= frames or sum(problem.samples) < 3:
+    if problem.size <= frames or total < 3:
         raise DataError(
-            f'{sum(problem.samples)} measurements give {problem.size} numbers, but the frames to '
+            f'{total} measurements give {problem.size} numbers, but the frames to '
             f'align have {frames}; measure more, or align less'
         )
     spread = max(float(np.ptp(q, axis=0).max()) for q in case.motions)
     seen = max(float(np.ptp(r.seen.position, axis=0).max()) for r in case.recordings)
     if spread < NOISE:
-        raise DataError(
-            'the joints do not move in any recording; '
-            + (
-                'there is nothing to compare'
-                if seen < NOISE
-                else 'the tool does, so these are not its joint states'
-            )
-        )
+        others = 'the tool does, so these are not its joint states'
+        why = 'there is nothing to compare' if seen < NOISE else others
+        raise DataError(f'the joints do not move in any recording; {why}')
     if seen < NOISE and not case.tool_fixed:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
-    total = sum(problem.samples)
     if problem.at_rest and total < ENOUGH:
         return (note(f'With {total} stations few causes can be told apart.'),)
     return ()

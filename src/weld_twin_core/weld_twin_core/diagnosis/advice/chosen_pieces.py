@@ -56,7 +56,6 @@ class Plan:
 
     @property
     def apart(self) -> float:
-        """Return what it adds in all, without a bound."""
         return float(self.gains[self.gains > NOTHING].sum())
 
     @property
@@ -67,7 +66,6 @@ class Plan:
 
     @property
     def other(self) -> int:
-        """Return the explanation that the first one is parted from most."""
         return self.others[self._most]
 
     @property
@@ -81,7 +79,6 @@ class Plan:
 
     @property
     def decided(self) -> bool:
-        """Return whether the data at hand part it already."""
         return self.before >= SAFE
 
     @property
@@ -114,7 +111,6 @@ class Plan:
 
     @property
     def minutes(self) -> float:
-        """Return how long it takes with what has to be set up [min]."""
         return self.candidate.set_up + self.robot_minutes
 
     def motion(self) -> JointMotion:

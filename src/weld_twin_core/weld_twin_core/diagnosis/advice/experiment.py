@@ -190,7 +190,6 @@ def _side(effects: Sequence[Effect]) -> list[dict[str, str | None]]:
 
 
 def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
-    """Return effects in words, beside those that they are to be distinguished from."""
     return ' with '.join(dict.fromkeys(_name(effect, others) for effect in effects))
 
 

@@ -139,7 +139,6 @@ class Design:
         return _Touchable(recording, rows)
 
     def after(self, rows: Array) -> Design:
-        """Return what is known after one more touch, rows of shape (3, P)."""
         _, size, ways = np.linalg.svd(rows @ self.root, full_matrices=False)
         less = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
         return replace(self, root=self.root - (self.root @ ways.T) * less @ ways)
@@ -319,7 +318,6 @@ class _Option(NamedTuple):
 
     @property
     def best(self) -> Design:
-        """Return what is known after the touches that are proposed."""
         return self.known[: _COUNT + 1][-1]
 
     def needed(self, spread: Array) -> int | None:

@@ -132,7 +132,6 @@ class Room:
         return np.asarray(self.home + 0.2 * (q[:count] - self.home))
 
     def way(self, stops: Sequence[Array]) -> bool:
-        """Return whether the straight ways of the joints from stop to stop are free."""
         places = np.array(stops)
         return bool(self._ways(places[:-1], places[1:]).all())
 

@@ -198,7 +198,6 @@ def _side(
 
 
 def _label(label: str, problem: Problem, mark: str) -> str:
-    """Return a column's name; frames of the new measurement are its own."""
     if label.startswith('base'):
         return f'{label} of {problem.recordings[0].name}'
     return label + mark if label.startswith('tool') else label

@@ -176,7 +176,6 @@ class Columns:
         return np.concatenate([piece.products(rows) for piece in self.pieces])
 
     def times(self, row: Array) -> Array:
-        """Return the products with one row, shape (rows,), as shape (P,)."""
         return self.products(row[None])[:, 0]
 
     def mixed(self, weights: Array) -> Array:

@@ -82,7 +82,6 @@ class Fit:
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> Array:
-    """Return the whitened columns of frames and found effects, shape (P, rows)."""
     return designed(problem, model, scale).written_out()
 
 
@@ -235,7 +234,6 @@ class _Point:
 
     @property
     def believed(self) -> float:
-        """Return how far frames and coordinates are from where they are believed, squared."""
         return float(self.ridge @ self.x**2) / self.share
 
     @property

@@ -111,7 +111,6 @@ def candidate_kinds(align: frozenset[str]) -> list[type[Effect]]:
 
 
 def constant(kind: type[Effect]) -> bool:
-    """Return whether a kind is a cause that never changes."""
     return kind.traits.cause and kind.traits.depends_on == 'constant'
 
 

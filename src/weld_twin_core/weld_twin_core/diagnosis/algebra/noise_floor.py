@@ -32,7 +32,6 @@ class NoiseFloor(NamedTuple):
 
     @property
     def rms_m(self) -> float:
-        """Return the RMS distance that it makes in three coordinates, [m]."""
         return self.sigma * float(np.sqrt(3))
 
 

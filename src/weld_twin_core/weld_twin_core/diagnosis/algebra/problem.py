@@ -120,12 +120,10 @@ class Problem:
 
     @property
     def own_bases(self) -> bool:
-        """Return whether recordings of an instrument each have a base that is fitted."""
         return 'base' in self.align and not self.touched and len(self.recordings) > 1
 
     @property
     def frame_count(self) -> int:
-        """Return the number of coordinates of the frames that are fitted along."""
         return 6 * (('base' in self.align) * len(self.stands) + ('tool' in self.align))
 
     @property
@@ -139,7 +137,6 @@ class Problem:
         return [(k, common) for k, common in each if common is not None]
 
     def of_frames(self) -> Problem:
-        """Return the problem with nothing fitted along but base and tool."""
         return replace(self.not_shared(), changes=())
 
     def not_shared(self) -> Problem:
@@ -496,7 +493,6 @@ class Model:
         return tuple(change.effect for change in self.changes if change.recording == own)
 
     def moved(self, k: int, step: Array) -> Model:
-        """Return the model with the base of recording k moved by (xyz, rotvec)."""
         bases = list(self.bases)
         bases[k] = _moved(bases[k], step, left=True)
         return replace(self, bases=tuple(bases))

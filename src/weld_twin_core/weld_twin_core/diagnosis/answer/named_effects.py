@@ -107,7 +107,6 @@ def standard_errors(
 
 
 def _instead(effect: Effect, sets: Sequence[tuple[Site, ...]]) -> set[tuple[str, str]]:
-    """Return names and joints of those that may be at work in an effect's place."""
     mine = Site.of(effect)
     named = {site for group in sets if mine in group for site in group} - {mine}
     return {(site.effect, site.joint or '') for site in named}

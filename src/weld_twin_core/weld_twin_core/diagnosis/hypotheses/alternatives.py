@@ -127,7 +127,6 @@ def with_leads(
 
 
 def _same_anywhere(now: Fit, effect: Effect, other: Alternative) -> bool:
-    """Return whether an effect and another are constants that are one error on any motion."""
     beside = of_no_size(other.site)
     constants = constant(type(effect)) and constant(type(beside))
     return constants and same_error(now.model.robot, effect, beside)

@@ -152,7 +152,6 @@ class Case:
 
     @property
     def slips(self) -> list[Slip]:
-        """Return what gave way at an instant and is more than a small step."""
         return [each for each in self.changes if isinstance(each, Slip) and each.dated]
 
     @cached_property

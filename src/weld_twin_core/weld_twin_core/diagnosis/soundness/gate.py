@@ -157,7 +157,6 @@ def examine(
 
 
 def _first(mistakes: Sequence[Finding], *, applied: bool) -> list[Check]:
-    """Return what stands before all checks: the mistakes, undone or not."""
     what = 'mended' if applied else 'data and set-up'
     return [Check(what, each.level, each.sentence) for each in mistakes]
 

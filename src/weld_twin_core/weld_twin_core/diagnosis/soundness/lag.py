@@ -111,7 +111,6 @@ def _aligned(seen: Array, path: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _off(seen: Array, path: Array, turn: Array) -> Array:
-    """Return what a turn leaves between measurements and a path, both about their means."""
     return np.asarray(seen - path @ np.swapaxes(turn, -1, -2))
 
 

@@ -123,7 +123,6 @@ def turns_as(given: Given, way: str) -> Given:
 
 
 def poses_inverted(given: Given) -> Given:
-    """Return what was given with measured poses inverted; points stay as they are."""
     return _seen_as(given, lambda seen: seen if seen.rotation is None else seen.inverted())
 
 

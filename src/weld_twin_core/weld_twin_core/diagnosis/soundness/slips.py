@@ -108,7 +108,6 @@ class Rest:
         return effective_share(np.concatenate(own), self.rows, self.samples)
 
     def change(self, thing: str, some: slice = slice(None)) -> Change:
-        """Return a change of base, tool or joints, or of some of their columns."""
         columns, metres = self.things[thing]
         return Change(self, columns[:, :, some], metres[:, :, some])
 
@@ -310,7 +309,6 @@ class Slip:
 
     @property
     def alike(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """Return kind and place of what would explain the same step nearly as well."""
         return tuple((_WORDS[type(other)][0], (other.at,)) for other in self.others)
 
     def sentence(self, recording: Recording) -> str:
@@ -473,7 +471,6 @@ class _Seen:
             yield Settling(k, late, size)
 
     def _age(self, k: int) -> Array:
-        """Return time in a recording as a share of it, shape (M,)."""
         t = self.problem.recordings[k].seen.t
         return np.asarray((t - t[0]) / max(float(np.ptp(t)), TINY))
 

@@ -48,7 +48,6 @@ class Snapshot:
 
     @property
     def problem(self) -> Problem:
-        """Return the snapshot as a problem with both frames and what may differ free."""
         return Problem(self.recordings, FRAMES, changes=self.model.changes)
 
     @property
@@ -111,7 +110,6 @@ class Snapshot:
 
     @cached_property
     def given(self) -> Model:
-        """Return the model with the frames fitted that may be anywhere, and the others as given."""
         return self.aligned(self.align)
 
     @cached_property
@@ -210,7 +208,6 @@ def of_joints(robot: Robot, kinds: Iterable[type[Effect]]) -> tuple[Effect, ...]
 
 
 def _strain(robot: Robot, errors: Sequence[Effect]) -> Array:
-    """Return every error in units of the most that a machine has, shape (K,)."""
     return np.array([np.abs(e.vector() / ranges(robot, e)[1]).max() for e in errors])
 
 

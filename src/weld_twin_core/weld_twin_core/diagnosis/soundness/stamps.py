@@ -137,7 +137,6 @@ def _stamped(even: Bursts, k: int, count: int) -> Mend:
 
 
 def _posed(given: Given) -> Case:
-    """Return a recording with both frames fitted, wherever they are."""
     return Case(*aligned(given.recordings, given.robot, FRAMES, ()))
 
 

@@ -102,7 +102,6 @@ def turned_bases() -> Iterator[Finding]:
 
 
 def conventions() -> Iterator[Finding]:
-    """Yield the ways to write orientations that get mixed up."""
     for way, (words, _) in WAYS.items():
         remedy = 'Mend the convention where the orientations are exported'
         yield mistake(words, 'other', ('instrument',), remedy, partial(turns_as, way=way))

@@ -108,7 +108,6 @@ class _Postures:
                 yield contact.label, self._contacts.of(contact.label)
 
     def middles(self) -> Iterator[tuple[str, Array]]:
-        """Yield where every contact of a point is, by the median of its postures."""
         for label, index in self._touched():
             yield label, np.median(self._points[index], axis=0)
 
@@ -130,7 +129,6 @@ class _Postures:
             )
 
     def resorted(self, middles: Mapping[str, Array], usual: float) -> Iterator[Unsound]:
-        """Count postures where they belong, and yield what was changed."""
         for label, index in self._touched():
             yield from self._strays(label, index, middles, usual)
             yield from self._moved(label, index[self._keep[index]], usual)

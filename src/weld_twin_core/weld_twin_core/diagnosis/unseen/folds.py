@@ -100,7 +100,6 @@ def means(values: Array, labels: NDArray[Any]) -> Array:
 
 
 def steadiness(before: Array, after: Array) -> float:
-    """Return the mean fall over the parts in its standard errors."""
     fall = before - after
     error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
     return float(fall.mean() / max(error, EMPTY))

@@ -141,7 +141,6 @@ class Unseen:
         return self.predict(range(len(self.parts)))
 
     def every_way(self) -> list[Unseen]:
-        """Return the same for each way to divide the data, this one first."""
         return [self, *(self.by(labels) for labels in ways_to_divide(self.problem)[1:])]
 
     def forget_other_parts(self) -> None:
@@ -293,7 +292,6 @@ class Unseen:
         return np.asarray(right - self.pull)
 
     def but_for(self, b: int, row: Array) -> Array:
-        """Return a row, shape (rows,), with zeros on one stretch."""
         out = np.array(row)
         out[self.spans[b]] = 0.0
         return out

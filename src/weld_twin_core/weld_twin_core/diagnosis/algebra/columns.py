@@ -261,10 +261,8 @@ def columns_covariance(
     hang together within a fold or differ between folds [1]_, each coefficient by the
     larger; they hang together as their columns do.
 
-    ridge: prior precision, shape (P,).
-    residual: what the fit leaves, whitened, shape (rows,).
-    labels: fold of every row, some `BLOCKS` in all.
-    share: of the rows that count as independent.
+    ridge, residual: prior precision, (P,), and what the fit leaves, whitened, (rows,).
+    labels, share: fold of every row, some `BLOCKS`; of the rows that count as independent.
 
     References
     ----------

@@ -130,12 +130,9 @@ def fit(
     """
     Return the most probable nuisance frames and coordinates of the found effects.
 
-    Least squares with the priors of machines and frames, by Levenberg-Marquardt on column-scaled
-    normal
-    equations.
+    Least squares with priors, by Levenberg-Marquardt on column-scaled normal equations.
 
-    precision: of every effect coordinate about zero, in whitened units, shape (K,); that of machines
-    at large when left out.
+    precision: of every effect coordinate about zero, in whitened units, (K,); else that of machines.
     tolerance: stops when the objective falls by less than this share.
     most: stops where a step is predicted to leave more than this, whitened squares.
     """

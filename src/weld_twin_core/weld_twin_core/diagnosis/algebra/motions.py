@@ -72,9 +72,8 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
     """
     Return which recording moves a joint farthest on its whole way, or all joints together.
 
-    Where an effect of many shapes may be is looked for there: a recording in which the joint stands
-    still shows none of them. Between stations nothing is seen: beside a motion hardly any of the way
-    to each counts, or a dozen would seem to show more of a joint than a path does.
+    An effect of many shapes is looked for there: where the joint stands still it shows none. Between
+    stations nothing is seen: beside a motion hardly any of the way to each counts.
     """
     if len(features) == 1:
         return 0

@@ -76,11 +76,10 @@ def with_changes(
     precision: Array | None = None,
 ) -> tuple[Problem, Model]:
     """
-    Return problem and model with what differs between the recordings, fitted.
+    Return problem and model with what differs between the recordings, fitted along with effects.
 
-    model: its effects are fitted along.
     families: what may differ; see `families_named`.
-    precision: prior precision of the effects, shape (K,); that of machines at large when left out.
+    precision: prior of the effects, shape (K,); that of machines at large when left out.
     """
     candidates = _candidates(problem, model.robot, families)
     if not candidates:

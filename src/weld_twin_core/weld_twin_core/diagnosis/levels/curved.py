@@ -153,9 +153,8 @@ def locate_gap(
     """
     Return the groups that tell place and dependence of an unknown gap; of any other nothing.
 
-    They explain what is left beside everything that is reported. Where there is no free-form
-    explanation, what was found to be left beside the model is a place, and so are joints that noise
-    comes from.
+    They explain what is left beside all that is reported: without a free-form explanation what was
+    found to be left beside the model, and joints that noise comes from.
     """
     if verdict.status != 'unknown':
         return FreeForm(())

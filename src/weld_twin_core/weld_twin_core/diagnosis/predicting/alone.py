@@ -43,11 +43,10 @@ def alone(
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
 
-    shrink: what the whole model leaves on data that were not fitted.
+    None where places of contacts take the part of an instrument, which no file is judged by.
+
     many: whether many small errors were fitted together, of which none is certain by itself. Else
     constants that were found mean the arm, and stay: frames and other zeros give way.
-
-    None where places of contacts take the part of an instrument, which no file is judged by.
     """
     if problem.touched or not model.found + model.known:
         return None

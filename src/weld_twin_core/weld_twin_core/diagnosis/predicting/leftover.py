@@ -101,9 +101,8 @@ class Predicted:
         """
         Return what a model foretells of samples that it was not fitted to.
 
-        unseen: with regions of posture left out in turn.
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
-        parts: the columns' products in every region.
+        parts: the columns' products in every region of posture, left out in turn.
         whole: mean and covariance of the coordinates given all rows.
         """
         error, ways = unseen.whole, _by_others(unseen, columns, parts, given)
@@ -197,8 +196,7 @@ def leftover(
     Return the standard deviations of what is left over.
 
     turning: joints that turn, shape (n,); what slides has no gear.
-    noise: of a measured coordinate [m], given with the data or seen in them.
-    rough: share of the arm's small errors that are of a usual size.
+    noise, rough: of a measured coordinate [m], if known; share of small errors of a usual size.
     lost: how much motion was found to be lost in every joint, shape (n,) [rad or m].
     """
     swings = _swings(predicted)

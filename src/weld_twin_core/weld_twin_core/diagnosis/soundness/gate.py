@@ -118,13 +118,10 @@ def examine(
     beliefs: Beliefs | None = None,
 ) -> Examined:
     """
-    Return what is wrong with data and set-up.
+    Return what is wrong with data and set-up, some effects known; DataError for nothing to work on.
 
-    known: in the twin from the start.
     apply: go on with mended data where every mistake can be undone.
     beliefs: what a difference between recordings must be worth.
-
-    Raises DataError: there is nothing to work on.
     """
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid

@@ -183,9 +183,8 @@ def stamped_evenly(
     count: int,
 ) -> Given:
     """
-    Return what was given with measurements of recording k stamped by an even clock.
+    Return what was given with measurements of recording k stamped by an even clock [s].
 
-    first, step: the first stamp, and the time from one to the next [s].
     lost: samples before which one is missing.
     count: how many measurements had these stamps; others in the same time take their share.
     """

@@ -132,11 +132,10 @@ class Snapshot:
         near: bool = True,
     ) -> Model:
         """
-        Return the model after a robust fit of its frames and of errors.
+        Return the model after a robust fit of its frames, believed near those given, and of errors.
 
         wider: how many times as large as those of machines at large they may be, shape (K,) or ().
         noise: at most so much of what is left counts as noise [m].
-        near: frames that were given are believed to be near.
         """
         # What is open to free frames, on few stations, is as it was given.
         as_given = near and self.align != FRAMES and self.remaining < FAR

@@ -53,9 +53,8 @@ def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Wh
     """
     Return where the gap lies, of the model before any effect was found.
 
-    found: what groups without a formula take off the whole gap.
-    causes: of the answer, if there are any: joints and regimes are then theirs, so that they say
-    what the answer says, also where a cause sits at no joint or its place is not certain.
+    causes: of the answer, if any: joints and regimes are then theirs, so that they say what the answer
+    says, also where a cause sits at no joint or its place is not certain.
     """
     problem, start = result.problem, result.baseline.model
     names = start.robot.joint_names

@@ -89,9 +89,7 @@ def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
     """
     Return a normal matrix with ones, and damping, on its diagonal, and the norms of its columns.
 
-    Solve ``normal
-    outer(size, size)`` for ``right
-    size`` and divide by ``size``.
+    Solve ``normal / outer(size, size)`` for ``right / size`` and divide by ``size``.
     """
     size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
     scaled = normal / (size[:, None] * size)

@@ -44,9 +44,7 @@ def chosen_anew(problem: Problem, model: Model, scale: Scale, k: int, labels: Ar
 
     For an effect that a search alone chooses (`FitHooks.chosen`), from the seeds of its kind. What
     was found is among the choices only where the others show more of it than chance would: the best
-    of D unrelated instances takes more than 1 - (D
-    p)^(-2
-    M) off M samples with probability p
+    of D unrelated instances takes more than 1 - (D / p)^(-2 / M) off M samples with probability p
     (`CHANCE`). Where the choice is what was found but for samples on the edge of a stair, that
     stays: on which side those lie the others cannot know. Whitened, shape (parts, rows).
     """

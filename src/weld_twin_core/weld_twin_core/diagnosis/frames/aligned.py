@@ -50,8 +50,7 @@ def aligned(
 
     recordings: what an instrument measured comes first in the problem, contacts after it.
     align: fitted in every hypothesis. Of contacts 'tool' where the tool point is not known; 'base'
-    where
-    it is not known where it stands, which says nothing where all places are unknown too.
+    where it is not known where it stands, which says nothing where all places are unknown too.
     given: of which of the recordings given each is a part; each by itself when left out.
 
     Raises DataError: nothing, or nothing inside a joint stream, was measured, or contacts are too few.

@@ -37,11 +37,9 @@ def forward(
 
     Several causes together may look like one that no machine has, and so may one that the library
     lacks. So the search passes it over; where such a one would still explain what is left in the end,
-    all
-    that entered after it stood in for a part of that, and goes. What looks like a machine's may stand
-    in
-    for several, too, until what enters next drives it beyond that: then it makes room, if the set that
-    this leads to is worth more.
+    all that entered after it stood in for a part of that, and goes. What looks like a machine's may
+    stand in for several, too, until what enters next drives it beyond that: then it makes room, if the
+    set that this leads to is worth more.
     """
     gone = set[Site]()
     made_room = _selected(work, now, most, tick, gone)

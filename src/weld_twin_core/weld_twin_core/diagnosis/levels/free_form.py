@@ -233,8 +233,7 @@ def alternative_weights(
     """
     Return each group with its weight in the place of member k, the weights adding up to one.
 
-    One that leaves r times the squared error on unseen folds weighs r to the power of -rows
-    4: the
+    One that leaves r times the squared error on unseen folds weighs r to the power of -rows / 4: the
     likelihood of so many rows, softened by two as real physics is a little richer than any group.
     """
     rest = members[:k] + members[k + 1 :]

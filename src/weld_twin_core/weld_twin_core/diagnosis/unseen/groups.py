@@ -220,9 +220,8 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
     if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
         yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
-        views = (maker.view for maker in features)
-        torques = (payload_torque(v.robot, v.frames, 1.0, np.zeros(3)) for v in views)
-        weighed = list(zip(features, torques, strict=True))
+        views = [(maker, maker.view) for maker in features]
+        weighed = [(m, payload_torque(v.robot, v.frames, 1.0, np.zeros(3))) for m, v in views]
         # Every joint bent by a mass at the tool; and what that does through the springs that are known.
         bent = [np.array([m.column(('q', i)) * t for i, t in enumerate(ts)]) for m, ts in weighed]
         yield 'load', 'load', bent, ()

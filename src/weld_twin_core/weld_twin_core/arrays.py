@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read-only float64 copies, checked at the public boundary; and which of many samples are taken."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError
+from .errors import DataError, TwinError
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,17 @@ def increasing(t: ArrayLike, name: str) -> Array:
 def spread_over(count: int, most: int) -> NDArray[np.intp]:
     """Return indices below ``count``, evenly spread, first and last among them; ``most`` at most."""
     return np.asarray(np.linspace(0, count - 1, min(most, count)).round(), dtype=np.intp)
+
+
+def refuse_unknown(
+    given: Iterable[Any], known: Iterable[str], where: str, error: type[TwinError]
+) -> None:
+    """Raise an error where a mapping has a key that nobody reads, with the keys there are."""
+    unknown = sorted(set(map(str, given)) - set(known))
+    if unknown:
+        raise error(
+            f'{where} has the unknown key {unknown[0]!r}; known keys are ' + ', '.join(known)
+        )
 
 
 def _short(value: Any) -> str:

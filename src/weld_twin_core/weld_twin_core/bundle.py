@@ -36,8 +36,7 @@ from .pose_noise import Common, PoseNoise
 from .recording import Measurements, Recording
 
 FOCAL, CENTRE = 3e-3, 3e-3
-"""Spread of focal length and of the centre of the image, in shares of the focal length: what
-calibrations of one camera with a printed board differ by."""
+"""Spread of focal length and image centre over focal length, as calibrations of one camera differ."""
 _BENT = (0.03, 0.15, 1e-3, 1e-3, 0.4)
 """Spread of k1 k2 p1 p2 k3 between such calibrations."""
 SHIFT, TURN = 1.0, 1.0
@@ -61,8 +60,7 @@ _TOGETHER = 64
 _SINGULAR = 1e9
 """Condition from which on images tell no pose."""
 _BEYOND = 1.1
-"""Of the size of an image, from where on a pixel is outside: where the size is not given it follows
-from the centre, which is off by some per cent."""
+"""Of the size of an image, where a pixel is outside: a size by the centre is off by some per cent."""
 LOOSEST, LOOSER = 10.0, 1.5
 """Times what was said that the points of a target may turn out to be off, and from where on that is
 believed: a printed board of a few dozen points errs by half more by chance in its figure at most."""
@@ -80,8 +78,7 @@ class _Adjusted(NamedTuple):
     lenses: tuple[Lens, ...]
     """As the images have them."""
     off: Array
-    """How far each lens is from the given one, in spreads of `FOCAL` and the others, shape (C,
-    9)."""
+    """How far each lens is from the given one, in spreads of `FOCAL` and others, shape (C, 9)."""
     pixel: float
     """Noise of a pixel's coordinate that is left [px]."""
     known: tuple[float, ...]
@@ -104,9 +101,7 @@ class _State:
     def sizes(self) -> Array:
         """Return the spread of every unknown that the stamps share, shape (Z,)."""
         lenses = [
-            np.concatenate(
-                [FOCAL * c.lens.focal, CENTRE * c.lens.focal, _BENT],
-            )
+            np.concatenate([FOCAL * c.lens.focal, CENTRE * c.lens.focal, _BENT])
             for c in self.seen.cameras
         ]
         placed = [np.repeat([SHIFT, TURN], 3) for _ in self.start.free]
@@ -216,16 +211,15 @@ class _Taken(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A state with its weights [1/px], and its rows."""
+    """A state with its weights [1/px]."""
 
     state: _State
     weight: Array
-    rows: tuple[Array, Array, Array]
 
-    @classmethod
-    def at(cls, state: _State, weight: Array) -> _Point:
-        """Return the state with what it makes of every sighting."""
-        return cls(state, weight, state.rows())
+    @cached_property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """Return what the state makes of every sighting."""
+        return self.state.rows()
 
     @property
     def cost(self) -> float:
@@ -269,7 +263,7 @@ class _Point:
         square = square + damping * each[:, :, None] * np.eye(6)
         right = _times(_swap(own.roots), own.right - own.shared @ step)
         tool = _solved(square, right)
-        return _Point.at(self.state.moved(step, tool), self.weight)
+        return _Point(self.state.moved(step, tool), self.weight)
 
 
 def _numbers(image: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -298,10 +292,10 @@ def adjusted(seen: Sightings) -> _Adjusted:
     given = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
     for _ in range(_REWEIGHTED):
         weight, _ = _weights(state, given)
-        state = _descended(_Point.at(state, weight)).state
+        state = _descended(_Point(state, weight)).state
     state = _loosened(state, given)
     weight, noise = _weights(state, given)
-    return _result(_Point.at(state, weight), noise)
+    return _result(_Point(state, weight), noise)
 
 
 def _loosened(state: _State, given: Array) -> _State:
@@ -314,7 +308,7 @@ def _loosened(state: _State, given: Array) -> _State:
     said = [target.sigma for target in state.seen.targets]
     for _ in range(_LEARNED):
         weight, _ = _weights(state, given)
-        normal = _Point.at(state, weight).reduced.normal
+        normal = _Point(state, weight).reduced.normal
         known = 1.0 - np.diag(np.linalg.inv(normal + np.eye(len(normal))))
         at = state.unknowns.size - sum(t.points.size for t in state.seen.targets)
         targets = []
@@ -328,7 +322,7 @@ def _loosened(state: _State, given: Array) -> _State:
         if all(target.sigma < LOOSER * first for target, first in pairs):
             return state
         state = state.with_targets(tuple(targets))
-        state = _descended(_Point.at(state, weight)).state
+        state = _descended(_Point(state, weight)).state
     return state
 
 

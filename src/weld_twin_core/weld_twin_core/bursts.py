@@ -16,8 +16,7 @@ _ENOUGH = 30
 _SHORT = 0.1
 """A step of less than this share of the mean step lies inside a burst."""
 _MANY = 0.4
-"""Share of the steps that must be so short; bursts of two have half. Of messages that arrive at
-random one step in ten is."""
+"""Share of the steps that must be so short: bursts of two have half, messages at random a tenth."""
 _LEAST = 5
 """Bursts below which there is no rate of bursts."""
 _WINDOW = 5

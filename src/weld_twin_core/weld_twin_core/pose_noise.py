@@ -81,16 +81,14 @@ class Common:
     """Errors that all samples of an instrument share, such as that of a camera's focal length."""
 
     change: Array
-    """What one standard deviation of each makes measured poses too large by, shape (M, c, K) [m,
-    rad]."""
+    """What a standard deviation of each makes poses too large by, shape (M, c, K) [m, rad]."""
     mean: Array
     """How large they are believed to be, in standard deviations, shape (K,)."""
 
     def __post_init__(self) -> None:
         mean = readonly(self.mean, (None,), 'common errors')
-        object.__setattr__(self, 'mean', mean)
         change = readonly(self.change, (None, None, mean.size), 'common errors')
-        object.__setattr__(self, 'change', change)
+        vars(self).update(mean=mean, change=change)
 
     def take(self, index: np.ndarray) -> Common:
         """Return that of some samples."""

@@ -51,8 +51,7 @@ class JointMotion:
     """
 
     t: Array
-    """Stamps on the joint clock, strictly increasing, counted from the recording's epoch, shape
-    (N,) [s]."""
+    """Stamps on the joint clock, strictly increasing, from the recording's epoch on, shape (N,) [s]."""
     q: Array
     """Joint positions, as commanded or as the controller read them, shape (N, n) [rad or m]."""
     qd: Array | None = None
@@ -65,10 +64,9 @@ class JointMotion:
         if t.size == 0:
             raise DataError('the joint stream is empty')
         q = readonly(self.q, (t.size, None), 'joint positions')
-        object.__setattr__(self, 't', t)
-        object.__setattr__(self, 'q', q)
+        vars(self).update(t=t, q=q)
         if self.qd is not None:
-            object.__setattr__(self, 'qd', readonly(self.qd, q.shape, 'joint velocities'))
+            vars(self).update(qd=readonly(self.qd, q.shape, 'joint velocities'))
 
     @cached_property
     def velocity(self) -> Array:
@@ -163,19 +161,17 @@ class Measurements:
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'measurement stamps')
-        object.__setattr__(self, 't', t)
-        position = readonly(self.position, (t.size, 3), 'measured positions')
-        object.__setattr__(self, 'position', position)
+        vars(self).update(t=t, position=readonly(self.position, (t.size, 3), 'measured positions'))
         if self.rotation is not None:
             rotation = readonly(self.rotation, (t.size, 3, 3), 'measured rotations')
-            object.__setattr__(self, 'rotation', rotation)
+            vars(self).update(rotation=rotation)
         if self.sigma is not None:
             sigma = readonly(self.sigma, (t.size,), 'sigma of the measurements')
             if sigma.size and sigma.min() < 0.0:
                 raise DataError(
                     f'sigma of the measurements is negative at sample {int(sigma.argmin())}'
                 )
-            object.__setattr__(self, 'sigma', sigma)
+            vars(self).update(sigma=sigma)
         rows = 3 if self.rotation is None else 6
         if self.noise is not None and self.noise.root.shape != (t.size, rows, rows):
             raise DataError(
@@ -251,8 +247,7 @@ class Signal:
     value: Array
     """Temperatures [degC], or force and torque [N, N m], shape (K,) or (K, 6)."""
     held: bool = False
-    """A sample is in force until the next one, as a running twin has it; else the signal is
-    straight between samples."""
+    """A sample is in force until the next, as in a running twin; else it is straight between them."""
 
     _columns: ClassVar[int | None] = 6
 
@@ -261,8 +256,7 @@ class Signal:
         if t.size == 0:
             raise DataError('a signal is empty; leave it out of the recording')
         shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, self._columns)
-        object.__setattr__(self, 't', t)
-        object.__setattr__(self, 'value', readonly(self.value, shape, 'signal values'))
+        vars(self).update(t=t, value=readonly(self.value, shape, 'signal values'))
 
     def at(self, t: Array) -> Array:
         """
@@ -368,8 +362,7 @@ class Recording:
     contacts: Contacts | None = None
     """What the tool point touched in every posture, in place of measured positions."""
     simulated: bool = False
-    """Whether it says of itself that a simulator made it, with or without noise of an
-    instrument."""
+    """Whether it says of itself that a simulator made it, with or without noise."""
     effort: JointSignal | None = None
     """Effort of each joint as the controller measured it, shape (K, n) [N m, or N of a slide];
     there where springs are to take it."""
@@ -507,12 +500,9 @@ class Recording:
         A running twin has to hold what it heard last; an analysis of the past knows the sample
         after as well.
         """
-        wrench, temperature = (
-            None if signal is None else replace(signal, held=False)
-            for signal in (self.wrench, self.temperature)
-        )
-        effort = None if self.effort is None else replace(self.effort, held=False)
-        return replace(self, wrench=wrench, temperature=temperature, effort=effort)
+        pairs = zip(('wrench', 'temperature', 'effort'), self.sides, strict=True)
+        straight: Any = {k: replace(s, held=False) for k, s in pairs if s is not None}
+        return replace(self, **straight)
 
     def thinned(self, measurements: int, joints: int) -> Recording:
         """

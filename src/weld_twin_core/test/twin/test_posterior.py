@@ -18,8 +18,7 @@ from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.directions import Directions
 from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
-from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.jumps import shown
+from weld_twin_core.twin.features import Features, shown
 from weld_twin_core.twin.posterior import Posterior, expected_poses, pose_covariances
 from weld_twin_core.twin.twin import Twin
 

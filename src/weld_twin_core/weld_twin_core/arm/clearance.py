@@ -20,15 +20,13 @@ from .mounting import rising, up
 from .robot import Robot
 
 _THICK = 0.05
-"""Radius of a link as a share of the arm's whole length: a UR5, 1.2 m from joint to joint, has 0.06 m,
-a KR 16 of 2.4 m has 0.12 m."""
+"""Radius of a link over the arm's whole length: of a UR5, 1.2 m long, 0.06 m, of a KR 16 0.12 m."""
 _TORCH = 0.03
 """Radius of what hangs on the flange [m]: a torch is about 60 mm thick."""
 _SHORT = 1e-3
 """Shorter lines [m] are no link."""
 _ALIKE = 1e-3
-"""Distance [m] by which two postures may differ and be as near: links that cannot move against each
-other differ by rounding."""
+"""Distance [m] within which two postures are as near: links that cannot meet differ by rounding."""
 _UPRIGHT = 0.99
 """Cosine of the angle to the vertical [1] from which an arm stands upright, within 8 degrees."""
 _GROUND = -1

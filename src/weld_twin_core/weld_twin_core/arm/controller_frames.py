@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, readonly
+from ..arrays import Array, readonly, refuse_unknown
 from ..errors import DataError
 from .rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
@@ -28,8 +28,7 @@ class ControllerFrames:
     """Where a controller has its base and flange; DataError where a frame is none."""
 
     base: Array = field(default_factory=lambda: np.eye(4))
-    """The controller's base, which positions of programs count from, in the base frame of the
-    rows, shape (4, 4) [m]."""
+    """The controller's base, which programs count from, in that of the rows, shape (4, 4) [m]."""
     flange: Array = field(default_factory=lambda: np.eye(4))
     """The controller's flange in the frame at the end of the last row, shape (4, 4) [m]."""
     foot: Array | None = None
@@ -49,12 +48,7 @@ class ControllerFrames:
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> ControllerFrames:
         """Build the frames from a robot file's mapping; DataError for an unknown key."""
-        unknown = sorted(set(map(str, data)) - _KEYS)
-        if unknown:
-            raise DataError(
-                f'controller has the unknown key {unknown[0]!r}; known keys are '
-                + ', '.join(sorted(_KEYS))
-            )
+        refuse_unknown(data, sorted(_KEYS), 'controller', DataError)
         return cls(
             frame_of(data.get('base'), 'controller base'),
             frame_of(data.get('flange'), 'controller flange'),

@@ -220,14 +220,16 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
     return slope
 
 
-def joint_moment(
-    robot: Robot, chain: Frames, i: int, wrench: Array | None = None, frame: str = 'tool'
+def carried_moment(
+    robot: Robot, chain: Frames, i: int, about: Array, wrench: Array | None, frame: str
 ) -> Array:
-    """Return the moment of what a joint of the robot carries about its origin, (3, ...) [N m]."""
-    moment: Array = cross(_loads(robot, chain)[i][1], _gravity_direction(robot, chain))
+    """Return the moment of what joint i of the robot carries about a point, (3, ...) [N m]."""
+    mass, lever = _loads(robot, chain)[i]
+    gravity = _gravity_direction(robot, chain)
+    moment: Array = cross(lever + mass * (chain.rows[i].z_point - about), gravity)
     if wrench is not None:
         force, own = _wrench_in_world(robot, chain, wrench, frame)
-        moment = moment + own + cross(components(chain.position) - chain.rows[i].z_point, force)
+        moment = moment + own + cross(components(chain.position) - about, force)
     return moment
 
 
@@ -246,24 +248,3 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
         y = cross(z, x)
     place: Array = origin + point[0] * x + point[1] * y + point[2] * z
     return place
-
-
-def base_moment(
-    robot: Robot, chain: Frames, wrench: Array | None = None, frame: str = 'tool'
-) -> Array:
-    """Return the moment of weights and wrench about the foot, in the world, (3, ...) [N m]."""
-    samples = chain.position.shape[:-1]
-    origin = pad(components(chain.root_point), len(samples))
-    lever = np.zeros((3, *samples))
-    if robot.mass is not None and robot.com is not None:
-        for i in range(robot.behind, robot.n):
-            place = link_point(robot, chain, i, robot.com[i])
-            lever = lever + robot.mass[i] * (place - origin)
-    if robot.payload_mass:
-        centre = chain.position + chain.rotation @ robot.payload_com
-        lever = lever + robot.payload_mass * (components(centre) - origin)
-    moment: Array = cross(lever, _gravity_direction(robot, chain))
-    if wrench is not None:
-        force, own = _wrench_in_world(robot, chain, wrench, frame)
-        moment = moment + own + cross(components(chain.position) - origin, force)
-    return moment

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Array
-from . import catalog
 from .catalog import load, names
 from .chain import Frames, frames
 from .controller_frames import ControllerFrames
@@ -79,8 +78,8 @@ def with_lent_masses(robot: Robot) -> Robot:
         return robot
     own = _axes(robot)
     fitting = []
-    for name in catalog.names():
-        other = catalog.load(name)
+    for name in names():
+        other = load(name)
         if other.mass is not None and other.n == robot.n and _alike(own, _axes(other)):
             fitting.append(other)
     if len(fitting) != 1:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, readonly
+from ..arrays import Array, readonly, refuse_unknown
 from ..errors import DataError, ModelError
 from .channels import ROW_CHANNELS
 from .controller_frames import ControllerFrames, frame_of, pose_mapping
@@ -84,8 +84,7 @@ class Robot:
     convention: str = 'standard'
     T_world_base: Array = field(default_factory=lambda: np.eye(4))
     T_flange_tool: Array = field(default_factory=lambda: np.eye(4))
-    """Where the chain begins and ends, shape (4, 4); it begins at the end of a positioner's
-    rows."""
+    """Where the chain begins (at the end of a positioner's rows) and ends, shape (4, 4)."""
     mass: Array | None = None
     """Of the links, shape (n,) [kg]."""
     com: Array | None = None
@@ -106,8 +105,7 @@ class Robot:
     behind: int = 0
     """Rows that the chain passes backwards: joints of the positioner, 0 for a robot alone."""
     T_root_base: Array = field(default_factory=lambda: np.eye(4))
-    """Where the robot's rows begin, in the frame where those of the positioner begin, shape (4, 4)
-    [m]."""
+    """Where the robot's rows begin, seen from where those of the positioner do, (4, 4) [m]."""
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -440,16 +438,11 @@ class Robot:
         return cls(
             name=name,
             joint_names=tuple(str(row['name']) for row in rows),
-            a=_column(rows, 'a'),
-            alpha=_column(rows, 'alpha'),
-            d=_column(rows, 'd'),
             theta=_column(rows, 'theta_offset'),
-            beta=_column(rows, 'beta'),
+            **{key: _column(rows, key) for key in ('a', 'alpha', 'd', 'beta')},
             prismatic=np.array([row.get('type', 'revolute') == 'prismatic' for row in rows]),
             lower=_column(rows, 'lower', -np.inf),
-            upper=_column(rows, 'upper', np.inf),
-            max_velocity=_column(rows, 'max_velocity', np.inf),
-            max_acceleration=_column(rows, 'max_acceleration', np.inf),
+            **{key: _column(rows, key, np.inf) for key in _LIMITS[1:]},
             convention=str(data.get('convention', 'standard')),
             T_world_base=frame_of(data.get('base'), 'base'),
             T_flange_tool=frame_of(data.get('tool'), 'tool'),
@@ -537,12 +530,7 @@ def _weighed(robot: Robot) -> Robot:
 
 
 def _known(mapping: Mapping[str, Any], keys: set[str], where: str) -> None:
-    unknown = sorted(set(map(str, mapping)) - keys)
-    if unknown:
-        raise ModelError(
-            f'{where} has the unknown key {unknown[0]!r}; known keys are '
-            + ', '.join(sorted(keys))
-        )
+    refuse_unknown(mapping, sorted(keys), where, ModelError)
 
 
 def _plausible(value: Any) -> dict[str, dict[str, dict[str, float]]]:

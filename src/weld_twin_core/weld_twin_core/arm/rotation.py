@@ -29,8 +29,7 @@ from ..errors import DataError
 SMALL_ANGLE = 1e-4
 """Below this angle [rad] the series of sin and cos are exact to rounding."""
 LARGE_TURN = 0.5
-"""Cosine of the angle (60 degrees) up to which the skew part of a matrix tells the turn to rounding;
-near half a turn it vanishes."""
+"""Cosine of the turn (60 degrees) that a matrix's skew part tells to rounding; near half a turn none."""
 
 
 def skew(vector: Array) -> Array:

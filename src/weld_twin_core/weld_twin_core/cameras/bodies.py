@@ -37,8 +37,7 @@ class Bodies:
     """A start for everything that is not known."""
 
     poses: Array
-    """Of cameras, then targets, each in the frame of its mount: that of the first body there,
-    shape (B, 4, 4)."""
+    """Of cameras, then targets, each in the first body on its mount, shape (B, 4, 4)."""
     free: tuple[int, ...]
     """The bodies that are not the first of their mount."""
     tool: Array

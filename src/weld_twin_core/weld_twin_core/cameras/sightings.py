@@ -63,8 +63,7 @@ class Target:
     sigma: float = PLACED
     """Uncertainty of every coordinate [m]."""
     facing: bool = False
-    """Whether its third axis points away from whoever sees it, as that of boards of OpenCV
-    does."""
+    """Whether its third axis points away from who sees it, as that of OpenCV's boards does."""
 
     def __post_init__(self) -> None:
         _mounted(f'target {self.name!r}', self.mount)
@@ -96,8 +95,7 @@ class Fitted(NamedTuple):
     pixel: float
     """Noise of a pixel's coordinate [px]."""
     off: Array
-    """How far each lens is from the given one, in spreads between calibrations of one lens, shape
-    (C, 9)."""
+    """How far each lens is from the given one, in spreads of calibrations of one, shape (C, 9)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +105,7 @@ class Sightings:
     cameras: tuple[Camera, ...]
     targets: tuple[Target, ...]
     t: Array
-    """Stamps of the images, strictly increasing, shape (M,) [s]; images of several cameras share a
-    stamp."""
+    """Stamps, strictly increasing, shape (M,) [s]; images of several cameras share one."""
     image: NDArray[np.intp]
     camera: NDArray[np.intp]
     target: NDArray[np.intp]

@@ -14,8 +14,7 @@ from ..errors import DataError
 KINDS = ('point', 'length', 'sphere', 'line', 'plane')
 """What a contact can be; how each is seen is in `surfaces`."""
 LOOSE = 1e-4
-"""Uncertainty [m, rad] of a length or an angle that came without one: a calliper's reading, and a
-tenth of a millimetre over a metre of straight edge."""
+"""Uncertainty [m, rad] of a length or angle without one, as of a calliper or a straight edge."""
 _FACE = 0.1
 """Length [m] over which the uncertainty of a known place turns a face or an edge: that of a block."""
 
@@ -82,7 +81,6 @@ class Tie:
     """Two labels."""
     value: float
     sigma: float = LOOSE
-    """Distance [m] of two points, centres or parallel planes, or angle [rad] of two planes, 0 of
-    parallel ones; its uncertainty."""
+    """Distance [m] of points, centres or parallel planes, or angle of planes [rad]; its uncertainty."""
     kind: str = 'distance'
     """'distance' or 'angle'."""

@@ -22,8 +22,7 @@ class Contacts:
     labels: tuple[str, ...]
     """What each posture touched."""
     value: Array | None = None
-    """Measured distance from the centre, for contacts of kind 'length', shape (M,) [m]; else
-    ignored."""
+    """Measured distance from the centre, of contacts of kind 'length', shape (M,) [m]."""
     sigma: Array | None = None
     """Standard deviation of each contact, where known, shape (M,) [m]."""
 

@@ -24,8 +24,7 @@ _HUBER = 3.0
 _NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size."""
 _FIRM = 1e3
-"""Weight of a known length against a contact: it is kept, and how far it may give is counted when
-unknowns are taken out."""
+"""Weight of a known length against a contact: it is kept; how far it may give is counted elsewhere."""
 
 
 @dataclass(frozen=True, eq=False)

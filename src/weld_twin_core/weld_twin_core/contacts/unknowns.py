@@ -39,8 +39,7 @@ class Unknowns:
     free: Array
     """Change of each row with the unknowns, shape (M, c, Z)."""
     ties: Array
-    """Change of every known length and place with the unknowns, over its uncertainty [1/m], shape
-    (T, Z)."""
+    """Change of what is known with the unknowns, over its uncertainty [1/m], shape (T, Z)."""
 
     def eliminated(self, unit: Array) -> tuple[Array, Array]:
         """

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.dynamics import joint_moment
+from ..arm.dynamics import carried_moment
 from ..arm.vectors import dot
 from .effect import Hooked, LinearEffect, SearchHooks, Traits, register
 from .view import Parameter, Robot, Shift, Stage, Value, View
@@ -66,7 +66,8 @@ class AxisCompliance(LinearEffect):
         """Return the moment about the x and the y of the frame in which the joint turns."""
         robot, chain = view.robot, view.frames
         i = robot.index(self.joint)
-        moment = joint_moment(robot, chain, i, view.wrench, view.wrench_frame)
+        about, frame = chain.rows[i].z_point, view.wrench_frame
+        moment = carried_moment(robot, chain, i, about, view.wrench, frame)
         inner = i if robot.convention == 'modified' else i - 1
         row = chain.rows[inner]
         return [{('alpha', inner): dot(row.x, moment), ('beta', inner): dot(row.y, moment)}]

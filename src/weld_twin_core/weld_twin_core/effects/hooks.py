@@ -86,11 +86,9 @@ class Traits:
     """What is wrong where it does not fit, after its name; ``robot`` and ``site`` are theirs.
     Without, it is only not looked for there."""
     waves: Waves | None = None
-    """Set by an effect that is a sum of waves in its joint's angle; its search also gives `orders`,
-    `with_orders` and `lines`."""
+    """Set by a sum of waves in a joint's angle; its search gives `orders`, `with_orders`, `lines`."""
     bends: bool = False
-    """Whether it stands for waves of a joint that travels too little for them; its search then gives
-    `bend`."""
+    """Whether it stands for waves of a joint that travels too little; its search gives `bend`."""
 
 
 class _Hooks:

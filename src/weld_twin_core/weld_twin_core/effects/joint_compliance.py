@@ -28,8 +28,7 @@ from .wording import metres, radians, size
 SOFTEST = 3e-4
 """Compliance of the softest joint [rad/(N m)] of an arm that is heavy enough for it."""
 _SAG = np.pi / 180.0
-"""Most that a joint sags under its arm's own weight [rad]: a degree is seen by the eye, and nobody sells
-it. A judgement."""
+"""Most that a joint sags under its arm's own weight [rad]: a degree is seen by the eye. A judgement."""
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 """Load torque for each N m of measured effort: against it where it holds the load."""
 _STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)

@@ -19,8 +19,7 @@ from .wording import number
 _POSTURES = np.array([0.4, 1.0])
 """Positions [rad or m] of all joints at which axes are looked at; at zero many arms are straight."""
 _MEETING = 0.01
-"""Distance [m] below which axes meet: of the bundled wrists they do within the digits of a table, or
-pass at 85 mm or more."""
+"""Distance [m] below which axes meet: those of bundled wrists do, or pass by 85 mm or more."""
 
 
 class _Search(SearchHooks):

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.dynamics import base_moment, wrench_rotation
+from ..arm.dynamics import carried_moment, wrench_rotation
 from ..arm.vectors import components, dot, pad
 from .effect import LinearEffect, Traits, register
 from .view import Array, Channel, Parameter, Robot, Shift, Stage, Value, View
@@ -89,8 +89,10 @@ class PedestalTilt(LinearEffect):
 
 def base_moments(view: View) -> tuple[Array, Array]:
     """Return the moments about the base's x and y that the arm and its load make, (..., N) [N m]."""
-    moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
-    axes = wrench_rotation(view.robot, view.frames, 'base')
+    robot, chain = view.robot, view.frames
+    foot = pad(components(chain.root_point), chain.position.ndim - 1)
+    moment = carried_moment(robot, chain, robot.behind, foot, view.wrench, view.wrench_frame)
+    axes = wrench_rotation(robot, chain, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
     return x, y
 

@@ -16,8 +16,7 @@ from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _SLOWED = (0.0, 0.5)
-"""Slowing that a search starts from, over the length of the recording: none, and a rate that falls
-by a third."""
+"""Slowing over the recording's length that a search starts from: none, and a rate down by a third."""
 _SMALL = 1e-4
 """Below it log(1 + x) / x is its series; there the two differ by 1e-13."""
 

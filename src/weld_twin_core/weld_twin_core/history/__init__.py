@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed on one arm from diagnosis to diagnosis, and where it leads."""
 
-from .changes import Change, changes
-from .forecast import Outlook, outlook, reaches
+from .changes import Change, Outlook, changes, outlook, reaches
 from .observation import Observation
 
 __all__ = ['Change', 'Observation', 'Outlook', 'changes', 'outlook', 'reaches']

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from ..arrays import Array
+from ..errors import DataError
 from .observation import Observation, Series, series_of
 
 _YEAR = 365.25
@@ -39,8 +40,7 @@ a log Bayes factor of three, twenty to one."""
 _DATED = 3.84
 """Fall within which another instant is as likely: 95 % of chi-square with one degree of freedom."""
 _SEASON_SPAN = 0.5
-"""Share of a year that must be covered before a season is looked for: what is shorter than half a wave
-is a trend."""
+"""Share of a year from which on a season is looked for: less than half a wave is a trend."""
 _NAMED = 3.0
 """Log Bayes factor by which a coordinate that a diagnosis has named goes before others: 20 to 1."""
 _LIKELY = 3.0
@@ -175,14 +175,52 @@ class _Look(NamedTuple):
         return out
 
 
-def value_and_rise(
+class Outlook(NamedTuple):
+    """Where a coordinate is at the last diagnosis, and how fast it moves."""
+
+    value: Array
+    """Value [SI], and rise in a day, shape (2,)."""
+    covariance: Array
+    """Shape (2, 2)."""
+
+
+def outlook(
     observations: Sequence[Observation], result: Sequence[Change], name: str
-) -> tuple[Array, Array]:
-    """Return a coordinate's value and rise in a day at the last diagnosis, and covariance."""
+) -> Outlook | None:
+    """Return where a coordinate is and how fast it moves, all fitted together; None without a trend."""
+    if not any(each.name == name and each.kind == 'trend' for each in result):
+        return None
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
     taken = [Term(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
-    return _System(series, taken).now(series.names.index(name))
+    return Outlook(*_System(series, taken).now(series.names.index(name)))
+
+
+_DRAWS = 20_000
+"""Draws of a trend; an interval's ends are good to 1 % of its width."""
+_SEED = 7
+"""The same trend gives the same interval."""
+
+
+def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
+    """
+    Return in how many days a size reaches a limit: 5 %, 50 % and 95 % of the chances.
+
+    0 where it is beyond already, infinity where it never is. Raises DataError: a limit that is not
+    positive.
+    """
+    if not limit > 0.0:
+        raise DataError(f'a limit must be positive, got {limit}')
+    rng = np.random.default_rng(_SEED)
+    spread, axes = np.linalg.eigh(now.covariance)
+    root = axes * np.sqrt(np.maximum(spread, 0.0))
+    value, slope = now.value[:, None] + root @ rng.standard_normal((2, _DRAWS))
+    side = np.where(slope >= 0.0, limit, -limit)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        days = np.where(np.abs(value) >= limit, 0.0, (side - value) / slope)
+    days = np.where(np.isnan(days), np.inf, np.maximum(days, 0.0))
+    low, middle, high = np.quantile(days, [0.05, 0.5, 0.95], method='inverted_cdf')
+    return float(low), float(middle), float(high)
 
 
 def _shapes(days: Array) -> list[_Shape]:

@@ -15,8 +15,7 @@ from ..arrays import Array, readonly
 from ..errors import DataError
 
 _SHOWN = 1e-6
-"""Share of the variance before the data that they must take away to have shown anything: less is
-the rounding of a file."""
+"""Share of the variance before the data that counts as taken away by them: less is a file's rounding."""
 _ABSENT = 3.0
 """Standard errors of the diagnoses that name an effect, within which it is taken to be zero in those
 that do not name it: it would have been named beyond."""
@@ -104,8 +103,7 @@ class Series:
     whitening: tuple[tuple[NDArray[np.int_], Array], ...]
     """Of every observation, the places of its coordinates and its `Observation.whitening`."""
     shapes: dict[tuple[str, int], tuple[Array, Array, Array]] = field(default_factory=dict)
-    """Of every shape in time that was tried, its sums over the observations: they are large, and the
-    same whatever else was found."""
+    """Sums over the observations of every shape that was tried: the same whatever was found."""
 
 
 def series_of(observations: Sequence[Observation]) -> Series:

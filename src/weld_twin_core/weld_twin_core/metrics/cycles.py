@@ -63,8 +63,7 @@ class PoseCycles:
     t: Array
     """Shape (cycles,) [s]."""
     attained: Array
-    """Measured positions, each less what its own command differs from that of the first, shape
-    (cycles, 3) [m]."""
+    """Measured positions, less what their commands differ from the first, (cycles, 3) [m]."""
     rotation: Array | None
     """Shape (cycles, 3, 3), or None."""
     came_from: tuple[int, ...]
@@ -227,8 +226,7 @@ class PathCycles:
     command: Array
     """Shape (m, 3) [m]."""
     crossed: Array
-    """Where each cycle passed the plane square to the path at each point, shape (cycles, m, 3)
-    [m]."""
+    """Where each cycle passed the plane square to the path there, (cycles, m, 3) [m]."""
 
 
 def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:

@@ -43,8 +43,7 @@ class PosePerformance:
     ap_m: float
     """Distance of the barycentre of the attained positions from the command [m]."""
     rp_m: float
-    """Radius of the repeatability sphere: mean distance from the barycentre plus three standard
-    deviations of it [m]."""
+    """Repeatability: mean distance from the barycentre and three deviations of it [m]."""
     ap_xyz_m: tuple[float, float, float]
     """Barycentre minus command [m]."""
     ap_rad: tuple[float, float, float] | None = None
@@ -66,8 +65,7 @@ class PathPerformance:
     at_m: float
     """Largest distance of the barycentre path from the command path [m]."""
     rt_m: float
-    """Largest, over the path, of mean distance from the barycentre plus three standard deviations
-    of it [m]."""
+    """Largest mean distance from the barycentre and three deviations of it [m]."""
     at_index: int
     rt_index: int
     """Command point at which each was found."""

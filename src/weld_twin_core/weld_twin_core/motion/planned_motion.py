@@ -146,30 +146,19 @@ def plan(
         slowed *= 1.01 * excess
     if excess > 1.0:
         raise PathError(_too_fast(robot, motion, timing, velocity, acceleration))
-    report = _report(line.solution, float(timing.t[-1]), slowed, velocity, acceleration, residual)
-    seam = path.sample(timing.s)
-    return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
-
-
-def _report(
-    solution: PathSolution,
-    duration: float,
-    slowed: float,
-    velocity: Array,
-    acceleration: Array,
-    residual: float,
-) -> _PlanReport:
-    return _PlanReport(
-        duration=duration,
+    report = _PlanReport(
+        duration=float(timing.t[-1]),
         slowed=slowed,
         velocity_use=velocity,
         acceleration_use=acceleration,
         residual=residual,
-        condition=float(solution.condition.max()),
-        manipulability=float(solution.manipulability.min()),
-        limit_margin=float(solution.limit_margin.min()),
-        method=solution.method,
+        condition=float(line.solution.condition.max()),
+        manipulability=float(line.solution.manipulability.min()),
+        limit_margin=float(line.solution.limit_margin.min()),
+        method=line.solution.method,
     )
+    seam = path.sample(timing.s)
+    return Plan(motion, line.poses(timing.s), seam, timing.s, path.length, report)
 
 
 class _JointLine:

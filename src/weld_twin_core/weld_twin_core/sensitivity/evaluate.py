@@ -117,14 +117,12 @@ def _few(study: Study, tolerances: Sequence[Tolerance]) -> _Few | None:
     kinds += [REGISTRY[tolerance.effect] for tolerance in tolerances]
     if any(kind.needs or not issubclass(kind, (ChannelError, FrameError)) for kind in kinds):
         return None
-    joints = study.recording.joints
-    q = joints.q if study.at is None else joints.at(study.at)[0]
-    result = determining(study.robot, q)
+    result = determining(study.robot, study.q)
     if result is None:
         return None
     samples, spread = result
     onto_seam = np.einsum('ns,nij->isjn', spread, study.axes)
-    return _Few(samples, onto_seam.reshape(3, -1, len(q)))
+    return _Few(samples, onto_seam.reshape(3, -1, study.samples))
 
 
 def draws_at(tolerances: Sequence[Tolerance], unit: Array) -> Array:

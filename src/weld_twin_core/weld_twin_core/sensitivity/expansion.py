@@ -142,10 +142,7 @@ def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
     strength, remaining = np.linalg.eigh(flat @ flat.T)
     remaining = remaining[:, strength > _RANK**2 * strength[-1]]
     shapes = (remaining.T @ flat).reshape(-1, 3, study.samples).swapaxes(0, 1)
-    chain = jacobian(
-        study.robot,
-        study.recording.joints.q if study.at is None else study.recording.joints.at(study.at)[0],
-    )
+    chain = jacobian(study.robot, study.q)
     moved = [study.on_seam(chain[:, :3, part.joint]).T for part in memory]
     return Expansion(
         study,

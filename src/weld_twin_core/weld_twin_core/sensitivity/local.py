@@ -51,8 +51,7 @@ class LocalSensitivity:
     turns: Array
     """Size of the analytic d orientation / d parameter, shape (P, N) [rad per unit]."""
     forward: Array
-    """D of a small error over the error: the paper's difference at no error, shape (P, N) [m per
-    unit]."""
+    """D of a small error over the error, as the paper has it, shape (P, N) [m per unit]."""
     offset_analytic: Array
     offset_difference: Array
     """dD/dp at an error of typical size, and its two-sided difference, shape (P, N) [m per unit];
@@ -249,9 +248,7 @@ def posture(study: Study) -> Posture:
     study : Study
 
     """
-    motion = study.recording.joints
-    q = motion.q if study.at is None else motion.at(study.at)[0]
-    strength = np.linalg.svd(jacobian(study.robot, q)[..., :3, :], compute_uv=False)
+    strength = np.linalg.svd(jacobian(study.robot, study.q)[..., :3, :], compute_uv=False)
     smallest = np.maximum(strength[..., -1], np.finfo(float).tiny)
     gain = np.asarray(strength[..., 0], dtype=np.float64)
     return Posture(gain / smallest, strength.prod(axis=-1), gain)

@@ -56,21 +56,13 @@ class Screening:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
+        columns = ('mu_star', 'mu_star_half', 'sigma')
         rows = [
-            {
-                'name': name,
-                'mu_star': float(self.mu_star[k]),
-                'mu_star_half': float(self.mu_star_half[k]),
-                'sigma': float(self.sigma[k]),
-            }
+            {'name': name, **{key: float(getattr(self, key)[k]) for key in columns}}
             for k, name in enumerate(self.names)
         ]
-        return {
-            'trajectories': self.trajectories,
-            'runs': self.runs,
-            'seed': self.seed,
-            'indices': rows,
-        }
+        counts = {key: getattr(self, key) for key in ('trajectories', 'runs', 'seed')}
+        return {**counts, 'indices': rows}
 
 
 @dataclass(frozen=True)

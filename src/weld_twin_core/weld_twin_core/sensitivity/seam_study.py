@@ -54,6 +54,12 @@ class Study:
         """Return the instants looked at, shape (N,) [s]."""
         return self.recording.joints.t if self.at is None else self.at
 
+    @property
+    def q(self) -> Array:
+        """Return the joint positions there, shape (N, n) [rad or m]."""
+        joints = self.recording.joints
+        return joints.q if self.at is None else joints.at(self.at)[0]
+
     def on_seam(self, vectors: Array) -> Array:
         """Return vectors (..., N, 3) of the world as along, across, normal, same shape."""
         return (self.axes @ vectors[..., None])[..., 0]

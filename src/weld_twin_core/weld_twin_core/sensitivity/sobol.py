@@ -63,14 +63,11 @@ class SobolIndices:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
+        columns = dict(
+            S1=self.first, S1_half=self.first_half, ST=self.total, ST_half=self.total_half
+        )
         rows = [
-            {
-                'name': name,
-                'S1': float(self.first[k]),
-                'S1_half': float(self.first_half[k]),
-                'ST': float(self.total[k]),
-                'ST_half': float(self.total_half[k]),
-            }
+            {'name': name, **{key: float(column[k]) for key, column in columns.items()}}
             for k, name in enumerate(self.names)
         ]
         return {

@@ -54,8 +54,7 @@ class ToleranceStack:
     runs: int
     seed: int
     percentiles: dict[str, Array]
-    """Value and 95 % interval at `_PERCENTILES` of d_norm, max_m, across_m and stickout_m, shape
-    (K, 3)."""
+    """Value and 95 % interval at `_PERCENTILES`, by the number of `Outcomes`, shape (K, 3)."""
     inside_across: Probability
     inside_stickout: Probability
     inside_both: Probability

@@ -58,15 +58,13 @@ class Sweep:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
-        return {
-            'name': self.name,
-            'unit': self.unit,
-            'values': self.values.tolist(),
-            'd_norm': (self.max_m / self.length).tolist(),
-            'max_m': self.max_m.tolist(),
-            'mean_m': self.mean_m.tolist(),
-            'departure': self.departure.tolist(),
+        columns = {
+            'values': self.values,
+            'd_norm': self.max_m / self.length,
+            **{key: getattr(self, key) for key in ('max_m', 'mean_m', 'departure')},
         }
+        numbers = {key: column.tolist() for key, column in columns.items()}
+        return {'name': self.name, 'unit': self.unit, **numbers}
 
 
 def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:

@@ -25,8 +25,7 @@ class Directions:
     """What may differ between the models that the recordings allow."""
 
     frames: tuple[str, ...]
-    """Of 'base' and 'tool', those that were fitted; six coordinates each (xyz, rotvec), the base
-    once for every set-up."""
+    """Those of 'base' and 'tool' that were fitted, six coordinates each, a base for every set-up."""
     setups: int
     """Number of base frames."""
     effects: tuple[Effect, ...]

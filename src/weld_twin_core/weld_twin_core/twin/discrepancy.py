@@ -65,11 +65,10 @@ class Discrepancy:
     swing on springs that no law of the model has."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
-        object.__setattr__(self, 'curves', readonly(self.curves, (None,), 'curves'))
-        turns = np.zeros_like(self.gears) if self.turns is None else self.turns
-        object.__setattr__(self, 'turns', readonly(turns, (None,), 'turns'))
-        object.__setattr__(self, 'peaks', readonly(self.peaks, (None,), 'peaks'))
+        if self.turns is None:
+            vars(self).update(turns=np.zeros_like(self.gears))
+        for name in ('gears', 'curves', 'turns', 'peaks'):
+            vars(self)[name] = readonly(getattr(self, name), (None,), name)
 
     def covariance(self, here: Where) -> Array:
         """Return its part of the covariance where it was recorded, shape (M, 6, 6)."""

@@ -28,8 +28,7 @@ SLOW = 0.03
 """Half of the time [s] over which a joint's acceleration is taken: a spring that swings at 10 to 50 Hz
 follows no faster, and neither a corner of a program nor an encoder's noise is an acceleration."""
 RINGS = 0.1
-"""Time [s] after an acceleration in which the tool still swings: that of one to five swings at 10 to 50
-Hz, which damp by and by."""
+"""Time [s] after an acceleration in which the tool still swings: one to five times at 10 to 50 Hz."""
 Remembered = tuple[bytes, str, bytes]
 """Instants looked at, effect and its parameters to the last digit."""
 
@@ -176,3 +175,23 @@ def with_expected_effort(recording: Recording, robot: Robot, load_of_effort: flo
     each = np.stack([load['tau', i] for i in range(robot.n)], axis=-1)
     effort = JointSignal(recording.joints.t, load_of_effort * each)
     return replace(recording, effort=effort, effort_holds=load_of_effort < 0.0)
+
+
+def jumps(features: Features) -> Array:
+    """Return how far effects jump from sample to sample, (M - 1, 3) [m]; no rows where nothing jumps."""
+    # Recordings show the place of a jump to a sample at best, and no derivative says so.
+    jumping = [e for e in features.twin.effects if e.traits.jumps]
+    if not jumping or features.recording.joints.static or features.at.size < 2:
+        return np.zeros((0, 3))
+    jumped = [
+        {channel: np.append(by, 0.0) for channel, by in e.twin.jump(features.view).items()}
+        for e in jumping
+    ]
+    moved: Array = np.sum([features.pose_change(by)[:3, :-1].T for by in jumped], axis=0)
+    return moved
+
+
+def shown(features: Features, noise: float) -> float:
+    """Return how many jumps a recording shows, those below a coordinate's noise [m] for less."""
+    power = (jumps(features) ** 2).sum(axis=1) / (3.0 * noise**2)
+    return float(np.minimum(power, 1.0).sum())

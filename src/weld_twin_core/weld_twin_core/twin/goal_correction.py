@@ -93,14 +93,12 @@ class CorrectedGoal:
 
     goal: Goal
     added: Array
-    """What was added to the pose at every point, in the axes of the robot's base, shape (N, 6) [m,
-    rad]."""
+    """What was added to the pose at points, in the axes of the base, (N, 6) [m, rad]."""
     before: float
     after: float
     """Expected RMS distance of the real tool from where the goal means it [m]."""
     bound: float | None
-    """Bound on the distance on the way, promised beforehand [m]; None where the
-    model says nothing of how sure it is."""
+    """Bound on the distance on the way [m]; None where the model tells no doubt."""
     waits: float = 0.0
     """How much later the goal begins, so that the correction sets in smoothly [s]."""
     notes: tuple[str, ...] = ()

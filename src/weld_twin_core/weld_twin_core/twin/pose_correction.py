@@ -54,8 +54,7 @@ class Looked(NamedTuple):
     pose: Array
     """The pose that was wanted, in the robot's base, shape (4, 4)."""
     values: Array
-    """What takes it to where the tool is to be commanded [m, rad], and the joints there, shape (6
-    + n,)."""
+    """What takes it to where the tool is commanded [m, rad], and the joints there, (6 + n,)."""
     slope: Array
     """How those change with the pose, shape (6 + n, 6)."""
 

@@ -32,8 +32,7 @@ from .compensation import commandable
 from .directions import Directions
 from .discrepancy import Discrepancy, Where
 from .domain import Domain
-from .features import Features, with_expected_effort
-from .jumps import jumps
+from .features import Features, jumps, with_expected_effort
 from .poses import Poses
 from .reversals import just_turned
 from .twin import Twin

@@ -36,8 +36,7 @@ class Accuracy(NamedTuple):
     same: tuple[float, float] | None = None
     """The same in the set-up that was recorded."""
     worsts: Array | None = None
-    """Largest distance under every model drawn, in the set-up recorded and in the robot's own
-    base, shape (2, D) [m]."""
+    """Largest distance under every model, by set-up and by the robot's own base, (2, D) [m]."""
 
     def within(self, tolerance: float) -> float | None:
         """Return the probability that the tool stays within a tolerance [m] all the way."""

@@ -79,8 +79,7 @@ class _MoveResult(NamedTuple):
     """How far the place it leads to was moved [m, rad]."""
     before: float | None = None
     after: float | None = None
-    """Expected distance of the real tool from that place [m]; None where the move could not be
-    followed."""
+    """Expected distance of the real tool from there [m]; None where it is not followed."""
     outside: str = ''
     """Why the move leaves what was recorded; empty where it does not."""
     sigma: float | None = None
@@ -106,8 +105,7 @@ class ProgramCorrection:
     """The same motion at finer steps: what is expected is of these samples."""
     before: tuple[Array, ...]
     after: tuple[Array, ...]
-    """What is missing to the real tool at every look of every piece, with what no program mends,
-    shape (N, 6) [m, rad]."""
+    """What is missing to the whole real tool at looks of every piece, (N, 6) [m, rad]."""
     ways: tuple[Array, ...]
     """How far the tool goes to every look, shape (N,) [m]."""
     drawn: tuple[Drawn | None, ...]

@@ -153,8 +153,7 @@ def _standstills(q: Array, before: float, near: float) -> list[tuple[int, int]]:
 
 
 _TAKEN_UP = 1e-3
-"""Way after a turn [rad or m] within which a joint takes up what it loses: play and the wind-up of
-gears are some tenths of a milliradian."""
+"""Way after a turn [rad or m] within which lost motion is taken up: it is tenths of a milliradian."""
 _BACK = 1e-5
 """Way back [rad or m] from which on it is a turn: more than an encoder's noise, less than any play."""
 

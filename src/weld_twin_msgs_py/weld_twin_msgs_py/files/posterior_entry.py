@@ -16,9 +16,8 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.directions import Directions
 from weld_twin_core.twin.discrepancy import Discrepancy
-from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.domain import Domain, Spots
 from weld_twin_core.twin.posterior import Posterior
-from weld_twin_core.twin.spots import Spots
 
 from .diagnosis_model import read_diagnosis
 

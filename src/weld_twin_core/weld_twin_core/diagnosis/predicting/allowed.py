@@ -32,7 +32,7 @@ from ...arrays import Array, spread_over
 from ...effects.dated import of_the_robot
 from ...twin.directions import Directions
 from ...twin.domain import Domain
-from ...twin.jumps import shown
+from ...twin.features import shown
 from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin

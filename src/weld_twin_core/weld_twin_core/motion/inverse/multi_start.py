@@ -22,9 +22,7 @@ from .newton import least_step, polish, pose_error
 CLOSED = 1e-9
 """Largest error [m, rad] of a solution."""
 _STARTS = 128
-"""
-Joint positions that a search starts from; of an arm with eight postures each is met many times.
-"""
+"""Positions that a search starts from; of an arm with eight postures each is met many times."""
 _ROUNDS = 60
 """Newton's steps from a start at most; a start that needs more is given up."""
 _SAME = 1e-4

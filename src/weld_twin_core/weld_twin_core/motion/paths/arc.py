@@ -27,7 +27,7 @@ class Arc(Path):
 
     def __post_init__(self) -> None:
         for name in ('start', 'middle', 'end'):
-            object.__setattr__(self, name, readonly(getattr(self, name), (3,), f'arc {name}'))
+            vars(self)[name] = readonly(getattr(self, name), (3,), f'arc {name}')
         first, second = self.middle - self.start, self.end - self.start
         plane = np.cross(first, second)
         area = float(np.linalg.norm(plane))
@@ -38,9 +38,9 @@ class Arc(Path):
             (second @ second) * first - (first @ first) * second, plane
         ) / (-2.0 * area**2)
         axis = plane / area
-        object.__setattr__(self, '_circle', _Circle.about(centre, axis, self.start))
         normal = axis * (-1.0 if axis[2] < -1e-9 else 1.0) if self.normal is None else self.normal
-        object.__setattr__(self, 'normal', unit(normal, 'arc normal'))
+        circle = _Circle.about(centre, axis, self.start)
+        vars(self).update(_circle=circle, normal=unit(normal, 'arc normal'))
 
     @property
     def radius(self) -> float:
@@ -91,18 +91,16 @@ class Circle(Path):
     """Out of the work, shape (3,); left out, the axis."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'centre', readonly(self.centre, (3,), 'circle centre'))
         axis = unit(self.axis, 'circle axis')
-        object.__setattr__(self, 'axis', axis)
+        vars(self).update(centre=readonly(self.centre, (3,), 'circle centre'), axis=axis)
         for name in ('radius', 'turns'):
-            object.__setattr__(self, name, positive(getattr(self, name), f'circle {name}'))
+            vars(self)[name] = positive(getattr(self, name), f'circle {name}')
         aside = np.eye(3)[0 if abs(axis[0]) < 0.9 else 1] if self.start is None else self.start
         aside = np.asarray(aside, dtype=np.float64)
         start = unit(aside - (aside @ axis) * axis, 'circle start across the axis')
         circle = _Circle.about(self.centre, axis, self.centre + self.radius * start)
-        object.__setattr__(self, '_circle', circle)
         normal = axis if self.normal is None else unit(self.normal, 'circle normal')
-        object.__setattr__(self, 'normal', normal)
+        vars(self).update(_circle=circle, normal=normal)
 
     @property
     def length(self) -> float:

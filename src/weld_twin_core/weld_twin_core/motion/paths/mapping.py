@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
+from ...arrays import refuse_unknown
 from ...errors import DataError, PathError
 from .arc import Arc, Circle
 from .polyline import Line, Polyline
@@ -68,11 +69,7 @@ def from_mapping(data: Mapping[str, Any]) -> Path:
 
 def _build(cls: type[Any], values: dict[str, Any], what: str) -> Any:
     known = {field.name: field for field in fields(cls)}
-    unknown = sorted(set(values) - set(known))
-    if unknown:
-        raise PathError(
-            f'{what} has the unknown key {unknown[0]!r}; known keys are ' + ', '.join(known)
-        )
+    refuse_unknown(values, known, what, PathError)
     missing = [
         name
         for name, field in known.items()

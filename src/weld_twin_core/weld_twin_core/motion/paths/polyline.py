@@ -26,7 +26,7 @@ class Line(Path):
 
     def __post_init__(self) -> None:
         for name in ('start', 'end'):
-            object.__setattr__(self, name, readonly(getattr(self, name), (3,), f'line {name}'))
+            vars(self)[name] = readonly(getattr(self, name), (3,), f'line {name}')
         object.__setattr__(self, 'normal', unit(self.normal, 'line normal'))
         if self.length < 1e-9:
             raise PathError('the line has no length: start and end are the same point')
@@ -58,12 +58,11 @@ class Polyline(Path):
         points = readonly(self.points, (None, 3), 'polyline points')
         if len(points) < 2:
             raise PathError(f'a polyline needs at least 2 points, got {len(points)}')
-        object.__setattr__(self, 'blend', positive(self.blend, 'polyline blend'))
-        object.__setattr__(self, 'points', points)
-        object.__setattr__(self, 'normal', unit(self.normal, 'polyline normal'))
+        vars(self).update(points=points, blend=positive(self.blend, 'polyline blend'))
         pieces = _pieces(points, self.blend)
-        object.__setattr__(self, '_pieces', pieces)
-        object.__setattr__(self, '_ends', np.cumsum([piece.length for piece in pieces]))
+        ends = np.cumsum([piece.length for piece in pieces])
+        normal = unit(self.normal, 'polyline normal')
+        vars(self).update(normal=normal, _pieces=pieces, _ends=ends)
 
     @property
     def length(self) -> float:

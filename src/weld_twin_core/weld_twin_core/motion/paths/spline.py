@@ -22,8 +22,7 @@ class Spline(Path):
     """The cubic spline through points, in arc length."""
 
     points: Array
-    """M at least 2, shape (M, 3) [m]; taught points, or a list imported from a drawing or a seam
-    tracker."""
+    """At least two, as taught or imported, shape (M, 3) [m]."""
     normal: Array = field(default_factory=up)
     """Out of the work, shape (3,) or (M, 3); one per point is interpolated."""
 
@@ -37,17 +36,12 @@ class Spline(Path):
             raise PathError(f'spline points {k} and {k + 1} are the same; drop one')
         knots = np.concatenate([[0.0], np.cumsum(chords)])
         curve = CubicSpline(knots, points)
-        object.__setattr__(self, 'points', points)
-        object.__setattr__(self, '_curve', curve)
-        object.__setattr__(self, '_parameter', _by_arc_length(curve, knots))
-        object.__setattr__(self, 'normal', self._normals(knots))
-
-    def _normals(self, knots: Array) -> Array:
+        vars(self).update(points=points, _curve=curve, _parameter=_by_arc_length(curve, knots))
         if np.ndim(self.normal) == 1:
-            return unit(self.normal, 'spline normal')
-        normals = readonly(self.normal, (knots.size, 3), 'spline normals')
-        object.__setattr__(self, '_normal_curve', CubicSpline(knots, normals))
-        return normals
+            vars(self).update(normal=unit(self.normal, 'spline normal'), _normal_curve=None)
+        else:
+            normals = readonly(self.normal, (knots.size, 3), 'spline normals')
+            vars(self).update(normal=normals, _normal_curve=CubicSpline(knots, normals))
 
     @property
     def length(self) -> float:
@@ -65,7 +59,7 @@ class Spline(Path):
         u = parameter(np.asarray(s, dtype=np.float64))
         velocity = curve(u, 1)
         tangent = velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
-        varying = self.__dict__.get('_normal_curve')
+        varying = self.__dict__['_normal_curve']
         return frames_on(curve(u), tangent, self.normal if varying is None else varying(u))
 
 

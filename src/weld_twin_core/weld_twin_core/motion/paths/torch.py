@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...arm.rotation import rotation_matrix, transform
-from ...arrays import Array
+from ...arrays import Array, refuse_unknown
 from ...errors import PathError
 from .seam_path import SeamFrames
 
@@ -89,12 +89,7 @@ class Torch:
         """
         if not isinstance(data, Mapping):
             raise PathError(f"'torch' must be a mapping of keys, got {type(data).__name__}")
-        known = cls.__dataclass_fields__
-        unknown = sorted(set(map(str, data)) - set(known))
-        if unknown:
-            raise PathError(
-                f'torch has the unknown key {unknown[0]!r}; known keys are ' + ', '.join(known)
-            )
+        refuse_unknown(data, cls.__dataclass_fields__, 'torch', PathError)
         return cls(**data)
 
 

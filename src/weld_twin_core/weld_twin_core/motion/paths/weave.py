@@ -37,7 +37,7 @@ class Weave(Path):
         if self.form not in FORMS:
             raise PathError(f'weave form must be one of {", ".join(FORMS)}, got {self.form!r}')
         for name in ('amplitude', 'wavelength'):
-            object.__setattr__(self, name, positive(getattr(self, name), f'weave {name}'))
+            vars(self)[name] = positive(getattr(self, name), f'weave {name}')
 
     @property
     def length(self) -> float:

@@ -38,8 +38,7 @@ _SHORT = 32
 _REST = 0.3
 """Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
 _NEAR = 0.15
-"""A linear move that would begin farther than this [rad or m] from the posture reached so far has
-to change the posture."""
+"""A linear move that would begin farther [rad or m] from the posture so far has to change it."""
 CLOSED = 1e-7
 """Gap [m, rad] up to which a pose counts as reached; programs write micrometres."""
 _STANDS = (
@@ -62,8 +61,7 @@ class Piece(NamedTuple):
     """Which move each sample belongs to, shape (N,)."""
     ends: np.ndarray
     vias: np.ndarray
-    """Sample at which each move ends, and passes its place on the way, shape (M,); -1 where it has
-    none."""
+    """Sample at which each move ends, and passes its place on the way, shape (M,); -1 for none."""
 
 
 class Travel(NamedTuple):

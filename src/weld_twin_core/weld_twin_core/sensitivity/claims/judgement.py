@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 from ...errors import DataError
@@ -40,16 +40,8 @@ class Claim:
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and strings."""
         measured = {key: {'least': a, 'largest': b} for key, (a, b) in self.measured.items()}
-        return {
-            'claim': self.key,
-            'statement': self.statement,
-            'where': self.where,
-            'verdict': self.verdict,
-            'reason': self.reason,
-            'held': self.held,
-            'cases': self.cases,
-            'measured': measured,
-        }
+        told = asdict(self)
+        return {'claim': told.pop('key'), **told, 'measured': measured}
 
 
 def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
@@ -68,13 +60,5 @@ def _decide(rule: Rule, cases: Sequence[Measured]) -> Claim:
     elif rule.holds_then is not None and all(rule.holds_then(case) for case in cases):
         verdict = f'{HOLDS_WHEN} {rule.condition}'
     measured = {key: (ranges[key].low, ranges[key].high) for key in rule.shows}
-    return Claim(
-        rule.key,
-        rule.statement,
-        rule.where,
-        verdict,
-        rule.reason(ranges),
-        held,
-        len(cases),
-        measured,
-    )
+    told = rule.key, rule.statement, rule.where, verdict, rule.reason(ranges)
+    return Claim(*told, held, len(cases), measured)

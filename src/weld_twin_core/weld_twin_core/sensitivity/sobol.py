@@ -63,9 +63,8 @@ class SobolIndices:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
-        columns = dict(
-            S1=self.first, S1_half=self.first_half, ST=self.total, ST_half=self.total_half
-        )
+        columns = {'S1': self.first, 'S1_half': self.first_half}
+        columns |= {'ST': self.total, 'ST_half': self.total_half}
         rows = [
             {'name': name, **{key: float(column[k]) for key, column in columns.items()}}
             for k, name in enumerate(self.names)

@@ -73,55 +73,6 @@ if TYPE_CHECKING:  # what tools see; at run time `__getattr__` finds the same by
     from .twin.stepping import LiveTwin as LiveTwin
     from .twin.twin import Twin as Twin
 
-__all__ = [
-    'Beliefs',
-    'Compensation',
-    'DataError',
-    'DeviationMetrics',
-    'Diagnosis',
-    'Effect',
-    'JointMotion',
-    'LiveTwin',
-    'Measurements',
-    'MemoryEffect',
-    'ModelError',
-    'Parameter',
-    'PathError',
-    'Plan',
-    'Poses',
-    'ReachError',
-    'Recording',
-    'Robot',
-    'Signal',
-    'Stage',
-    'Twin',
-    'TwinError',
-    'View',
-    'catalog',
-    'compensate',
-    'corrected',
-    'default_seam',
-    'deviation_metrics',
-    'diagnose',
-    'effect_from_mapping',
-    'effects',
-    'effects_from_list',
-    'errors',
-    'forward',
-    'gravity_torque',
-    'jacobian',
-    'load',
-    'metrics',
-    'paths',
-    'plan',
-    'profiles',
-    'register',
-    'rotation',
-    'sensitivity',
-    'solve',
-    'solve_path',
-]
-
 _ROOMS = {
     'catalog': 'arm.catalog',
     'effects': 'effects',
@@ -154,6 +105,7 @@ _HOMES = {
     'twin.twin': ('Twin',),
 }
 """Every other public name, under the module that defines it."""
+__all__ = sorted([*_ROOMS, *(name for names in _HOMES.values() for name in names)])
 
 
 def __getattr__(name: str) -> Any:

@@ -56,22 +56,7 @@ class Bursts(NamedTuple):
 
 
 def bursts(t: Array) -> Bursts | None:
-    """
-    Return the bursts of a stream; None where its stamps come one by one.
-
-    t: stamps, not decreasing, shape (N,) [s].
-
-    Examples
-    --------
-    Forty samples taken every 0.1 s and sent by fours:
-
-    >>> import numpy as np
-    >>> from weld_twin_core.bursts import bursts
-    >>> sent = np.repeat(np.arange(10) * 0.4 + 0.3, 4) + np.tile(np.arange(4) * 1e-4, 10)
-    >>> print(bursts(sent).number, round(bursts(sent).rate, 2))
-    10 10.0
-
-    """
+    """Return the bursts of stamps (N,) [s], not decreasing; None where they come one by one."""
     steps = np.diff(t)
     if t.size < _ENOUGH or t[-1] <= t[0]:
         return None

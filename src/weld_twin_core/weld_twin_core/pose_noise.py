@@ -20,18 +20,7 @@ _TINY = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PoseNoise:
-    """
-    Noise of measured poses or points, given with them.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from weld_twin_core.pose_noise import PoseNoise
-    >>> board = PoseNoise.of(np.diag([1e-8, 1e-8, 1e-6])[None])
-    >>> print(board.sigma.round(6), (board.root[0] @ [1e-4, 0.0, 1e-3] / board.typical).round(3))
-    [0.000583] [1. 0. 1.]
-
-    """
+    """Noise of measured poses or points, given with them."""
 
     root: Array
     """Makes independent rows of an error (c, M): shift [m], then turn about the axes outside

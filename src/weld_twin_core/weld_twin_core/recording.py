@@ -92,30 +92,18 @@ class JointMotion:
         return readonly(backward_rates(self.t, self.q), self.q.shape, 'joint velocities')
 
     def nearest(self, t: Array) -> np.ndarray:
-        """
-        Return the index of the sample nearest in time, an integer array of shape t.shape.
-
-        Parameters
-        ----------
-        t : array, any shape [s]
-
-        """
+        """Return the index of the sample nearest in time, of any shape [s], as integers t.shape."""
         after = np.clip(np.searchsorted(self.t, t), 0, self.t.size - 1)
         before = np.maximum(after - 1, 0)
         return np.where(np.abs(t - self.t[before]) <= np.abs(self.t[after] - t), before, after)
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """
-        Return joint position and velocity at other times, shape t.shape + (n,).
+        Return joint position and velocity at times of any shape [s], shape t.shape + (n,).
 
         Cubic Hermite between samples: a planned motion is smooth, and at 125 Hz a straight line
         between samples would be wrong by more than a laser tracker's noise. Times outside the
         stream take its first or last position at rest.
-
-        Parameters
-        ----------
-        t : array, any shape [s]
-
         """
         if self.static or self.t.size < 2:
             index = self.nearest(np.asarray(t))
@@ -182,16 +170,10 @@ class Measurements:
 
     def inverted(self) -> Measurements:
         """
-        Return the pose of the measuring frame in what was measured, in place of the reverse.
+        Return the pose of the measuring frame in what was measured; DataError for points.
 
         A camera on the arm that looks at a fixed board measures the board; inverted it is a camera
         on the arm that the board measures.
-
-        Raises
-        ------
-        DataError
-            Points were measured: a point has no frame.
-
         """
         if self.rotation is None:
             raise DataError('only measured poses can be inverted; these are points')
@@ -205,14 +187,7 @@ class Measurements:
         return Measurements(self.t, position, turn, sigma, noise, common)
 
     def take(self, index: np.ndarray) -> Measurements:
-        """
-        Return some of the measurements.
-
-        Parameters
-        ----------
-        index : array of int, or of bool with shape (M,)
-
-        """
+        """Return some of the measurements, by an index of int or of bool (M,)."""
         return Measurements(
             self.t[index],
             self.position[index],
@@ -259,14 +234,7 @@ class Signal:
         vars(self).update(t=t, value=readonly(self.value, shape, 'signal values'))
 
     def at(self, t: Array) -> Array:
-        """
-        Return the signal at other times; beyond its ends it is that of the first or last sample.
-
-        Parameters
-        ----------
-        t : array, any shape [s]
-
-        """
+        """Return the signal at times of any shape [s]; beyond its ends the first or last sample."""
         if self.held:
             in_force = np.maximum(np.searchsorted(self.t, t, side='right') - 1, 0)
             return np.asarray(self.value[in_force])
@@ -410,15 +378,10 @@ class Recording:
 
     def at(self, t: Array) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         """
-        Return joint position and velocity, wrench, temperature and effort at other times.
+        Return joint position and velocity, wrench, temperature and effort at times of any shape [s].
 
         What belongs to the stamps of the recording's own measurements is worked out once: a fit
         asks for it again and again.
-
-        Parameters
-        ----------
-        t : array, any shape [s]
-
         """
         if self.measured is not None and t is self.measured.t:
             return self._at_measured
@@ -466,30 +429,11 @@ class Recording:
         return self.contacts
 
     def with_measured(self, measured: Measurements | None) -> Recording:
-        """
-        Return the recording with other measurements beside the same motion.
-
-        Parameters
-        ----------
-        measured : Measurements, or None for no measurements
-
-        """
+        """Return the recording with other measurements, or none, beside the same motion."""
         return replace(self, measured=measured)
 
     def at_temperature(self, celsius: float) -> Recording:
-        """
-        Return the recording with one temperature all along.
-
-        Parameters
-        ----------
-        celsius : float [degC]
-
-        Raises
-        ------
-        DataError
-            It is no number, or no arm is so cold or warm.
-
-        """
+        """Return the recording with one temperature [degC] all along; DataError for none."""
         warm = np.array([checked_temperature(celsius)])
         return replace(self, temperature=Signal(self.joints.t[:1], warm))
 
@@ -511,12 +455,6 @@ class Recording:
         Both are taken evenly over the whole recording, each with a note: play, warm-up and drift
         depend on all that went before, so no stretch is left out. Joint velocity is that of the
         full stream. Stations stay whole.
-
-        Parameters
-        ----------
-        measurements, joints : int
-            How many samples of each are kept at most.
-
         """
         if self.joints.static:
             return self

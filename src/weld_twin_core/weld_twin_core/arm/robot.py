@@ -191,13 +191,7 @@ class Robot:
         Return the positioner and the robot beside it, each from its own foot outward.
 
         Both stand in the frame where the positioner's rows begin. The tool of the positioner is the
-        frame that the chain is measured in.
-
-        Raises
-        ------
-        ModelError
-            The robot has no positioner.
-
+        frame that the chain is measured in. ModelError for a robot alone.
         """
         if not self.behind:
             raise ModelError(f'robot {self.name!r} has no joints between workpiece and foot')
@@ -213,15 +207,7 @@ class Robot:
         return first, self.part(range(self.behind, self.n), T_world_base=self.T_root_base)
 
     def index(self, joint: str) -> int:
-        """
-        Return the position of a joint in the chain, counted from 0.
-
-        Raises
-        ------
-        ModelError
-            The robot has no such joint; the message lists those it has.
-
-        """
+        """Return a joint's place in the chain, from 0; ModelError lists the joints there are."""
         try:
             return self.joint_names.index(joint)
         except ValueError:
@@ -237,17 +223,7 @@ class Robot:
         return [dict(zip(ROW_CHANNELS, values, strict=True)) for values in each]
 
     def with_frames(self, *, base: Array | None = None, tool: Array | None = None) -> Robot:
-        """
-        Return the same arm with another base or tool frame.
-
-        Parameters
-        ----------
-        base : array, shape (4, 4) [m], optional
-            ``T_world_base``; left out, it stays.
-        tool : array, shape (4, 4) [m], optional
-            ``T_flange_tool``; left out, it stays.
-
-        """
+        """Return the same arm with other frames ``T_world_base``, ``T_flange_tool``, (4, 4) [m]."""
         frames = {'T_world_base': base, 'T_flange_tool': tool}
         new = {key: frame for key, frame in frames.items() if frame is not None}
         if all(frame is getattr(self, key) for key, frame in new.items()):
@@ -259,30 +235,13 @@ class Robot:
         return out
 
     def with_origin(self, T_world_origin: Array) -> Robot:
-        """
-        Return the same arm with its foot elsewhere, see `T_world_origin`.
-
-        Parameters
-        ----------
-        T_world_origin : array, shape (4, 4) [m]
-
-        """
+        """Return the same arm with its foot elsewhere, see `T_world_origin`, shape (4, 4) [m]."""
         if self.controller is None:
             return self.with_frames(base=T_world_origin)
         return self.with_frames(base=T_world_origin @ np.linalg.inv(self.T_base_origin))
 
     def part(self, which: Sequence[int], **changes: Any) -> Robot:
-        """
-        Return some of the rows as a robot alone.
-
-        Parameters
-        ----------
-        which : sequence of int
-            Rows in the order of the new chain, counted from 0.
-        changes : keyword arguments
-            Attributes that are other than this robot's.
-
-        """
+        """Return some rows, in the order of the new chain, as a robot alone with some changes."""
         keys = _PER_ROW if self.mass is None else (*_PER_ROW, 'mass', 'com')
         rows = {key: getattr(self, key)[list(which)] for key in keys}
         names = tuple(self.joint_names[k] for k in which)
@@ -293,16 +252,8 @@ class Robot:
         """
         Return the chain from the tool of a positioner to the tool of this robot.
 
-        Parameters
-        ----------
-        positioner : Robot
-            It stands in the same world; its payload is the workpiece. The bases of both say where.
-
-        Raises
-        ------
-        ModelError
-            Both have a joint of one name, or their rows are of two conventions.
-
+        The positioner's payload is the workpiece; the bases of both say where they stand in one world.
+        ModelError for a joint name twice, or rows of two conventions.
         """
         if positioner.convention != self.convention:
             raise ModelError(
@@ -327,20 +278,7 @@ class Robot:
         )
 
     def refuse_positioner(self, what: str) -> None:
-        """
-        Refuse what is only there for a robot alone.
-
-        Parameters
-        ----------
-        what : str
-            What was asked for, as a noun.
-
-        Raises
-        ------
-        ModelError
-            The robot has a positioner.
-
-        """
+        """Raise ModelError where what is asked for, a noun, is there for a robot alone."""
         if self.behind:
             moved = ', '.join(self.joint_names[: self.behind])
             raise ModelError(
@@ -349,19 +287,7 @@ class Robot:
             )
 
     def check_positions(self, q: Array) -> None:
-        """
-        Refuse joint positions that look like degrees or lie outside the limits.
-
-        Parameters
-        ----------
-        q : array, shape (..., n) [rad or m]
-
-        Raises
-        ------
-        DataError
-            Names the joint, the value and the likely reason.
-
-        """
+        """Raise DataError where joints (..., n) [rad or m] look like degrees, or are beyond limits."""
         values = np.asarray(q).reshape(-1, self.n)
         slack = 1e-6
         outside = (values < self.lower - slack) | (values > self.upper + slack)

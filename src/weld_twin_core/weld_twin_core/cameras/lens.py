@@ -35,19 +35,7 @@ _SIZES = (0, 4, 5, 8)
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """
-    Intrinsics of a camera.
-
-    Raises DataError: a focal length is not positive, or there are another number of coefficients.
-
-    Examples
-    --------
-    >>> from weld_twin_core.cameras import Lens
-    >>> lens = Lens([800.0, 800.0], [320.0, 240.0], [])
-    >>> print(lens.project([[0.1, 0.0, 2.0]]))
-    [[360. 240.]]
-
-    """
+    """Intrinsics of a camera; DataError for focal lengths or coefficients that make no sense."""
 
     focal: Array
     centre: Array

@@ -8,17 +8,5 @@ from .contacts import Contacts
 from .places import Length, Places, lengths, places, spreads
 from .unknowns import Unknowns, unknowns
 
-__all__ = [
-    'KINDS',
-    'Artefact',
-    'Contact',
-    'Contacts',
-    'Length',
-    'Places',
-    'Tie',
-    'Unknowns',
-    'lengths',
-    'places',
-    'spreads',
-    'unknowns',
-]
+__all__ = ['KINDS', 'Artefact', 'Contact', 'Contacts', 'Length', 'Places', 'Tie', 'Unknowns']
+__all__ += ['lengths', 'places', 'spreads', 'unknowns']

@@ -23,17 +23,6 @@ class Artefact:
 
     Raises DataError: a label comes twice, a tie names an unknown label, or its value makes no
     sense.
-
-    Examples
-    --------
-    >>> from weld_twin_core.contacts import Artefact
-    >>> plate = Artefact.from_mapping({
-    ...     'contacts': {'a': {'kind': 'point'}, 'b': {'kind': 'point'}},
-    ...     'distances': [{'between': ['a', 'b'], 'value': 0.05, 'sigma': 0.0001}],
-    ... })
-    >>> plate.ties[0].value
-    0.05
-
     """
 
     contacts: tuple[Contact, ...]
@@ -65,15 +54,7 @@ class Artefact:
         return any(contact.known for contact in self.contacts)
 
     def named(self, label: str) -> Contact:
-        """
-        Return the contact of a label.
-
-        Raises
-        ------
-        DataError
-            There is none.
-
-        """
+        """Return the contact of a label; DataError where there is none."""
         for contact in self.contacts:
             if contact.label == label:
                 return contact

@@ -221,15 +221,7 @@ class Effect(Parametric, ABC):
         return {('q', view.robot.index(str(self.site))): by}
 
     def remedy(self, robot: Robot) -> str:
-        """
-        Return what to mend where it was found, as one sentence with its size.
-
-        Parameters
-        ----------
-        robot : Robot
-            The nominal model: what is entered in the controller now.
-
-        """
+        """Return what to mend of a nominal robot where it was found: one sentence with its size."""
         sizes = ', '.join(
             f'{p.name} {np.array2string(np.asarray(getattr(self, p.name)), precision=4)} '
             f'{self.unit(p, robot)}'
@@ -239,29 +231,12 @@ class Effect(Parametric, ABC):
         return f'Put {self.name}{where} into the model: {sizes}.'
 
     def unit(self, parameter: Parameter, robot: Robot | None = None) -> str:
-        """
-        Return the SI unit of one of its parameters on a robot.
-
-        Parameters
-        ----------
-        robot : Robot, optional
-            Left out, its joint turns.
-
-        """
+        """Return the SI unit of one of its parameters on a robot; left out, its joint turns."""
         slides = robot is not None and self.on_slide(robot)
         return SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
 
     def check(self, robot: Robot) -> None:
-        """
-        Refuse an effect this robot cannot have.
-
-        Raises
-        ------
-        ModelError
-            Unknown joint, wrong length, not a number, outside the bounds, or the robot has no such
-            part.
-
-        """
+        """Raise ModelError for a joint, a part or values that this robot cannot have."""
         if self.of in ('joint', 'link'):
             if self.site is None:
                 raise ModelError(f'{self.name} needs a joint')

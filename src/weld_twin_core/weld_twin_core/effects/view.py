@@ -149,16 +149,7 @@ class Parameter:
         return replace(self, range=Plausible.of(numbers, source))
 
     def plausible_sliding(self, numbers: tuple[float, ...], source: str) -> Parameter:
-        """
-        Return the same with what holds of it where its joint slides; see `plausible`.
-
-        Parameters
-        ----------
-        numbers : tuple of 3 or 2 float
-            In m instead of rad.
-        source : str
-
-        """
+        """Return the same with what holds in m instead of rad, where its joint slides."""
         return replace(self, sliding=Plausible.of(numbers, source))
 
 
@@ -215,16 +206,7 @@ class View:
         return _SLIDING if self.robot.prismatic[index] else 1.0
 
     def displaced(self, *more: Shift, keep_frames: bool = False) -> View:
-        """
-        Return the view with more displacement.
-
-        Parameters
-        ----------
-        more : mappings of channel to array
-        keep_frames : bool
-            The displacement moves no frame, so frames already worked out stay as they are.
-
-        """
+        """Return the view with more displacement, and its frames where that moves none of them."""
         total = dict(self.shift)
         for shift in more:
             for key, value in shift.items():

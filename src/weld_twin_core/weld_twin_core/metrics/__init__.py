@@ -34,18 +34,7 @@ from .iso9283 import (
     pose_performance,
 )
 
-__all__ = [
-    'DeviationMetrics',
-    'DriftPerformance',
-    'PathPerformance',
-    'PosePerformance',
-    'RunningMetrics',
-    'deviation_metrics',
-    'drift',
-    'multidirectional_variation',
-    'normalized_deviation',
-    'orientation_error',
-    'path_performance',
-    'pose_performance',
-    'root_mean_square',
-]
+__all__ = ['DeviationMetrics', 'DriftPerformance', 'PathPerformance', 'PosePerformance']
+__all__ += ['RunningMetrics', 'deviation_metrics', 'drift', 'multidirectional_variation']
+__all__ += ['normalized_deviation', 'orientation_error', 'path_performance', 'pose_performance']
+__all__ += ['root_mean_square']

@@ -226,17 +226,7 @@ class RunningMetrics:
         self.samples = 0
 
     def add(self, deviation: Array, twin: Array) -> None:
-        """
-        Take one pair of a measurement and the twin.
-
-        Parameters
-        ----------
-        deviation : array, shape (3,) [m]
-            Measured minus twin.
-        twin : array, shape (3,) [m]
-            Where the twin has the tool.
-
-        """
+        """Take a deviation, measured minus twin, and where the twin has the tool, (3,) [m] each."""
         if self._before is not None:
             self._gone += float(np.linalg.norm(twin - self._before))
         self._before = twin

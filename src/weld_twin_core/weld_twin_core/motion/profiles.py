@@ -56,22 +56,7 @@ class Profile(ABC):
         """Return s(t) from 0 to the length, from t = 0 to the last breakpoint."""
 
     def sample(self, length: float, dt: float, most: int = MOST_SAMPLES) -> Timing:
-        """
-        Return the law at equal steps, the last of them at or just after the end.
-
-        Parameters
-        ----------
-        length : float [m]
-        dt : float [s]
-        most : int
-            Samples it may have.
-
-        Raises
-        ------
-        PathError
-            It would have more.
-
-        """
+        """Return the law over a length [m] at steps dt [s] to its end; PathError for too many."""
         law = self.law(length)
         end = float(law.x[-1])
         refuse_endless(end, dt, most)

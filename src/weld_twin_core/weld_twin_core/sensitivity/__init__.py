@@ -57,57 +57,13 @@ from .trajectory_advice import (
     expected_rms,
 )
 
-__all__ = [
-    'FAMILIES',
-    'POINTS',
-    'Distribution',
-    'LocalSensitivity',
-    'Model',
-    'MorrisDesign',
-    'Outcomes',
-    'Placement',
-    'PlacementResult',
-    'Posture',
-    'Probability',
-    'ProfileResult',
-    'Room',
-    'Screening',
-    'Sizes',
-    'SobolDesign',
-    'SobolIndices',
-    'Study',
-    'Sweep',
-    'Tolerance',
-    'ToleranceStack',
-    'WeldTolerance',
-    'advise',
-    'arc_weights',
-    'compare_profiles',
-    'cumulative',
-    'default_tolerances',
-    'default_values',
-    'draws_at',
-    'end_of_linearity',
-    'exact_deviations',
-    'expected_deviation',
-    'expected_rms',
-    'local_sensitivity',
-    'model',
-    'morris_screening',
-    'outcomes',
-    'planned_study',
-    'posture',
-    'probabilities',
-    'recorded_study',
-    'scaled',
-    'scenario_deviations',
-    'sobol_indices',
-    'spread_of_passes',
-    'study_of_plan',
-    'sweep',
-    'together',
-    'tolerance_stack',
-    'tolerances_from_list',
-    'with_draws',
-    'with_known',
-]
+__all__ = ['FAMILIES', 'POINTS', 'Distribution', 'LocalSensitivity', 'Model', 'MorrisDesign']
+__all__ += ['Outcomes', 'Placement', 'PlacementResult', 'Posture', 'Probability', 'ProfileResult']
+__all__ += ['Room', 'Screening', 'Sizes', 'SobolDesign', 'SobolIndices', 'Study', 'Sweep']
+__all__ += ['Tolerance', 'ToleranceStack', 'WeldTolerance', 'advise', 'arc_weights']
+__all__ += ['compare_profiles', 'cumulative', 'default_tolerances', 'default_values', 'draws_at']
+__all__ += ['end_of_linearity', 'exact_deviations', 'expected_deviation', 'expected_rms']
+__all__ += ['local_sensitivity', 'model', 'morris_screening', 'outcomes', 'planned_study']
+__all__ += ['posture', 'probabilities', 'recorded_study', 'scaled', 'scenario_deviations']
+__all__ += ['sobol_indices', 'spread_of_passes', 'study_of_plan', 'sweep', 'together']
+__all__ += ['tolerance_stack', 'tolerances_from_list', 'with_draws', 'with_known']

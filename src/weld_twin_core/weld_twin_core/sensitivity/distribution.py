@@ -85,15 +85,7 @@ class Distribution:
         return self._below(self.lower), self._below(self.upper)
 
     def values(self, unit: ArrayLike) -> Array:
-        """
-        Return the values at probabilities, shape (...), in the unit of the parameter.
-
-        Parameters
-        ----------
-        unit : array_like, shape (...)
-            Probabilities between 0 and 1.
-
-        """
+        """Return the values at probabilities (...) from 0 to 1, in the parameter's unit."""
         low, high = self._mass()
         p = low + (high - low) * np.asarray(unit, dtype=np.float64)
         # The ends of an unbounded distribution are at infinity; no sample may land there.
@@ -130,22 +122,7 @@ class Distribution:
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any], lower: float, upper: float) -> Distribution:
-        """
-        Build a distribution from the keys of a tolerance file.
-
-        Parameters
-        ----------
-        data : mapping
-            ``distribution`` names one of `KINDS`; the other keys are its numbers.
-        lower, upper : float
-            Bounds of the parameter, in its unit.
-
-        Raises
-        ------
-        ModelError
-            A key is missing, unknown or not a number.
-
-        """
+        """Build one from a tolerance file's keys, within bounds; ModelError where a key is wrong."""
         kind = str(data.get('distribution', 'normal'))
         if kind not in KINDS:
             raise ModelError(f'a distribution must be one of {", ".join(KINDS)}, got {kind!r}')

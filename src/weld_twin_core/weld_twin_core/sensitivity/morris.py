@@ -89,15 +89,7 @@ class MorrisDesign:
         return np.concatenate(each) * (1.0 - 2.0 * _MARGIN) + _MARGIN
 
     def screening(self, results: Array) -> Screening:
-        """
-        Return the measures of model results in the order of `samples`.
-
-        Raises
-        ------
-        DataError
-            A result is not a number.
-
-        """
+        """Return the measures of results in the order of `samples`; DataError for no number."""
         values = np.asarray(results, dtype=np.float64)
         refuse_unfinite(values, 'Morris screening')
         inputs = len(self.names)

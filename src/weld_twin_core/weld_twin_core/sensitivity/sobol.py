@@ -120,15 +120,7 @@ class SobolDesign:
         return mixed(first, second, self.groups).reshape(-1, inputs)
 
     def indices(self, results: Array) -> SobolIndices:
-        """
-        Return the indices of model results, shape (N (G + 2),), in the order of `samples`.
-
-        Raises
-        ------
-        DataError
-            A result is not a number, or there are more or fewer than samples.
-
-        """
+        """Return the indices of results in the order of `samples`; DataError for wrong or equal ones."""
         block = len(self.labels) + 2
         values = np.asarray(results, dtype=np.float64)
         if values.shape != (self.base_samples * block,):

@@ -138,14 +138,10 @@ class Posterior:
 
     def position_ways(self, features: Features, setup: int = 0) -> tuple[Array, Array]:
         """
-        Return in which ways positions may be off, and the covariance of what no parameter explains.
+        Return in which ways positions may be off (M, 3, R) [m], and the rest's covariance (M, 3, 3).
 
-        Returns
-        -------
-        tuple of array
-            One column for each independent way, of one standard deviation, shape (M, 3, R) [m]: what
-            more measurements would take away. The rest, shape (M, 3, 3) [m^2].
-
+        One column for each independent way, of one standard deviation: what more measurements would
+        take away. The rest is what no parameter explains.
         """
         moved, rest, grown = self._ways(features, setup)
         ways = (moved[:, :3] * grown).transpose(2, 1, 0)

@@ -92,15 +92,7 @@ class Twin(EffectStages):
         return self._full(self._evaluate(recording, at, False))
 
     def joints(self, recording: Recording, at: Array | None = None) -> Array:
-        """
-        Return the joint positions behind the poses, shape (..., M, n) [rad or m].
-
-        Parameters
-        ----------
-        recording, at
-            As for `poses`.
-
-        """
+        """Return the joint positions behind `poses`, shape (..., M, n) [rad or m]."""
         view = self._evaluate(recording, at, False).view
         parts = [
             np.asarray(view.q[..., i] + view.shift.get(('q', i), 0.0)) for i in range(self.robot.n)
@@ -145,15 +137,7 @@ class Twin(EffectStages):
         return poses, np.moveaxis(out, (0, 1), (-2, -1))
 
     def columns(self, run: Evaluation) -> Callable[[Channel], Array]:
-        """
-        Return what gives d pose / d channel, shape (6, ...); joints move springs behind them.
-
-        Parameters
-        ----------
-        run : Evaluation
-            The pass at which the derivative is taken.
-
-        """
+        """Return what gives d pose / d channel (6, ...) at a pass; joints move springs behind them."""
         rigid = cache(partial(column, self.robot, run.chain, shift=run.view.shift))
         yielding = self.yielding(run.view)
         if yielding is None:
@@ -179,17 +163,7 @@ class Twin(EffectStages):
     def pose_change(
         self, shift: Shift, columns: Callable[[Channel], Array], shape: tuple[int, ...]
     ) -> Array:
-        """
-        Return the change of pose, shape (6, ...), that a small change of channels makes.
-
-        Parameters
-        ----------
-        columns : callable
-            Gives d pose / d channel, shape (6, ...), of a channel.
-        shape : tuple of int
-            Of the samples.
-
-        """
+        """Return what a shift does to poses (6, ...) by columns of channels, at a shape of samples."""
         total = np.zeros((6, *shape))
         for channel, value in shift.items():
             for direct, factor in self.direct(channel):

@@ -21,17 +21,5 @@ from .spline import Spline
 from .torch import Torch
 from .weave import Weave
 
-__all__ = [
-    'KINDS',
-    'Arc',
-    'Circle',
-    'Line',
-    'Path',
-    'Polyline',
-    'SeamFrames',
-    'Spline',
-    'Torch',
-    'Weave',
-    'default_seam',
-    'from_mapping',
-]
+__all__ = ['KINDS', 'Arc', 'Circle', 'Line', 'Path', 'Polyline', 'SeamFrames', 'Spline', 'Torch']
+__all__ += ['Weave', 'default_seam', 'from_mapping']

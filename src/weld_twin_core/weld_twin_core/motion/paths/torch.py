@@ -54,15 +54,7 @@ class Torch:
                 raise PathError(f'torch {name} must be an angle in radians, got {value!r}')
 
     def poses(self, frames: SeamFrames, first: SeamFrames | None = None) -> Array:
-        """
-        Return tool poses, shape (N, 4, 4).
-
-        Parameters
-        ----------
-        first : SeamFrames, optional
-            The seam at its start, which a fixed heading refers to; left out, ``frames[0]``.
-
-        """
+        """Return tool poses (N, 4, 4); a fixed heading refers to the first frame, or ``frames[0]``."""
         tilted = self._tilted(frames)
         if self.heading == 'fixed':
             start = frames if first is None else first
@@ -78,15 +70,7 @@ class Torch:
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> Torch:
-        """
-        Build a torch from a mapping of its attributes.
-
-        Raises
-        ------
-        PathError
-            A key is unknown or a value wrong.
-
-        """
+        """Build a torch from a mapping of its attributes; PathError where one is wrong."""
         if not isinstance(data, Mapping):
             raise PathError(f"'torch' must be a mapping of keys, got {type(data).__name__}")
         refuse_unknown(data, cls.__dataclass_fields__, 'torch', PathError)

@@ -35,11 +35,11 @@ from .errors import DataError
 from .pose_noise import Common, PoseNoise
 from .recording import Measurements, Recording
 
-FOCAL, CENTRE = 3e-3, 3e-3
+_FOCAL, _CENTRE = 3e-3, 3e-3
 """Spread of focal length and image centre over focal length, as calibrations of one camera differ."""
 _BENT = (0.03, 0.15, 1e-3, 1e-3, 0.4)
 """Spread of k1 k2 p1 p2 k3 between such calibrations."""
-SHIFT, TURN = 1.0, 1.0
+_SHIFT, _TURN = 1.0, 1.0
 """Spread [m, rad] of the places of further cameras and targets: they may be anywhere."""
 _HUBER = 3.0
 """A pixel this many robust deviations off starts to lose weight."""
@@ -47,7 +47,7 @@ _NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size."""
 _LEAST_PIXEL = 1e-3
 """Noise of a pixel [px] that is taken at the least: images without any are computed."""
-ROUNDS = 30
+_ROUNDS = 30
 """Steps at the most; six are usual."""
 _SETTLED = 1e-6
 """Share by which the cost must still fall."""
@@ -61,7 +61,7 @@ _SINGULAR = 1e9
 """Condition from which on images tell no pose."""
 _BEYOND = 1.1
 """Of the size of an image, where a pixel is outside: a size by the centre is off by some per cent."""
-LOOSEST, LOOSER = 10.0, 1.5
+_LOOSEST, _LOOSER = 10.0, 1.5
 """Times what was said that the points of a target may turn out to be off, and from where on that is
 believed: a printed board of a few dozen points errs by half more by chance in its figure at most."""
 _LEARNED = 3
@@ -78,7 +78,7 @@ class _Adjusted(NamedTuple):
     lenses: tuple[Lens, ...]
     """As the images have them."""
     off: Array
-    """How far each lens is from the given one, in spreads of `FOCAL` and others, shape (C, 9)."""
+    """How far each lens is from the given one, in spreads of `_FOCAL` and others, shape (C, 9)."""
     pixel: float
     """Noise of a pixel's coordinate that is left [px]."""
     known: tuple[float, ...]
@@ -101,10 +101,10 @@ class _State:
     def sizes(self) -> Array:
         """Return the spread of every unknown that the stamps share, shape (Z,)."""
         lenses = [
-            np.concatenate([FOCAL * c.lens.focal, CENTRE * c.lens.focal, _BENT])
+            np.concatenate([_FOCAL * c.lens.focal, _CENTRE * c.lens.focal, _BENT])
             for c in self.seen.cameras
         ]
-        placed = [np.repeat([SHIFT, TURN], 3) for _ in self.start.free]
+        placed = [np.repeat([_SHIFT, _TURN], 3) for _ in self.start.free]
         points = [np.full(t.points.size, t.sigma) for t in self.seen.targets]
         return np.concatenate([*lenses, *placed, *points])
 
@@ -316,10 +316,10 @@ def _loosened(state: _State, given: Array) -> _State:
             own = slice(at, at + target.points.size)
             at = own.stop
             off = float((state.unknowns[own] ** 2).sum()) / max(float(known[own].sum()), 1e-9)
-            sigma = min(max(target.sigma * off**0.5, first), LOOSEST * first)
+            sigma = min(max(target.sigma * off**0.5, first), _LOOSEST * first)
             targets.append(replace(target, sigma=sigma))
         pairs = list(zip(targets, said, strict=True))
-        if all(target.sigma < LOOSER * first for target, first in pairs):
+        if all(target.sigma < _LOOSER * first for target, first in pairs):
             return state
         state = state.with_targets(tuple(targets))
         state = _descended(_Point(state, weight)).state
@@ -342,7 +342,7 @@ def seen_by(recording: Recording, seen: Sightings) -> Recording:
         f'points of target {target.name!r} are off by {1e3 * sigma:.2f} mm, not by '
         f'{1e3 * target.sigma:.2f} mm as was said'
         for target, sigma in zip(seen.targets, result.known, strict=True)
-        if sigma > LOOSER * target.sigma
+        if sigma > _LOOSER * target.sigma
     ]
     return replace(
         recording,
@@ -400,7 +400,7 @@ def _weights(state: _State, given: Array) -> tuple[Array, float]:
 def _descended(here: _Point) -> _Point:
     """Return the place that Levenberg and Marquardt lead to."""
     damping = 1e-6
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         there = here.stepped(damping)
         while not there.cost <= here.cost and damping < _DAMPED:
             damping = damping * 10.0

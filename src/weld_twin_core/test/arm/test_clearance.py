@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.clearance import Space, body, clearances
+from weld_twin_core.arm.clearance import Space, _clearances, body
 from weld_twin_core.arm.robot import Robot
 
 UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])
@@ -53,7 +53,7 @@ def test_links_are_as_far_apart_as_points_on_them_are(ur5):
             if abs(shape.link[i] - shape.link[j]) >= 2
         ]
         nearest.append(min(gaps))
-    np.testing.assert_allclose(clearances(shape).min(axis=1), nearest, atol=0.05)
+    np.testing.assert_allclose(_clearances(shape).min(axis=1), nearest, atol=0.05)
 
 
 @pytest.mark.parametrize('name', catalog.names())

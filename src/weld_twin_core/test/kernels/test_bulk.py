@@ -12,7 +12,7 @@ import pytest
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import bulk_kernel as bulk
 from weld_twin_core.arm.bulk.buffers import aligned
-from weld_twin_core.arm.bulk.bulk_kernel import LENGTHS, BulkKernel, kernel_of
+from weld_twin_core.arm.bulk.bulk_kernel import _LENGTHS, BulkKernel, kernel_of
 from weld_twin_core.arm.bulk.half_angle import HalfAngle
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.single_pose import SinglePose
@@ -118,7 +118,7 @@ def test_a_kernel_keeps_the_memory_of_a_few_lengths_only(make_robot: Callable[..
     kernel = BulkKernel(make_robot(6))
     for count in range(1, 20):
         kernel.poses(positions(kernel.robot, count))
-    assert len(kernel._memory) <= LENGTHS
+    assert len(kernel._memory) <= _LENGTHS
 
 
 def test_memory_that_poses_cannot_be_written_to_is_refused(

@@ -31,7 +31,7 @@ _UPRIGHT = 0.99
 """Cosine of the angle to the vertical [1] from which an arm stands upright, within 8 degrees."""
 _GROUND = -1
 """Stands for the line from a positioner's foot to the robot's, where nothing is."""
-PLACES = 5
+_PLACES = 5
 """Places along each of two lines between which their distance is looked at."""
 
 
@@ -90,9 +90,9 @@ def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
     return np.stack(np.broadcast_arrays(*points), axis=-2), np.array(link)
 
 
-def clearances(shape: _Body) -> Array:
+def _clearances(shape: _Body) -> Array:
     """Return the gaps of links that are no neighbours, (..., pairs) [m]; below 0 they overlap."""
-    share = np.linspace(0.0, 1.0, PLACES)[:, None]
+    share = np.linspace(0.0, 1.0, _PLACES)[:, None]
     along = shape.start[..., None, :] * (1.0 - share) + shape.end[..., None, :] * share
     out = []
     for i, j in combinations(range(shape.link.size), 2):
@@ -131,7 +131,7 @@ class Space:
         long = np.logical_or(whole.long, self._known.long)
         asked = whole.of(long)
         near = np.minimum(self._as_usual(long), 0.0) - _ALIKE
-        good = (clearances(asked) >= near).all(axis=-1)
+        good = (_clearances(asked) >= near).all(axis=-1)
         ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
         if self._box is not None:
             inside = (ends >= self._box[0]) & (ends <= self._box[1])
@@ -144,7 +144,7 @@ class Space:
         """Return how near these capsules came in the postures that were seen, shape (pairs,)."""
         key = long.tobytes()
         if key not in self._usual:
-            self._usual[key] = clearances(self._known.of(long)).min(axis=0)
+            self._usual[key] = _clearances(self._known.of(long)).min(axis=0)
         return self._usual[key]
 
 

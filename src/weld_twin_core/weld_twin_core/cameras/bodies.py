@@ -23,7 +23,7 @@ _COMPARED = 60
 """Views that are compared with each other at the most, to find the one that most agree with."""
 
 
-class View(NamedTuple):
+class _View(NamedTuple):
     """One target in one image: stamp, the bodies on the world and on the tool, and their relation."""
 
     image: int
@@ -79,7 +79,7 @@ def _count(seen: Sightings) -> int:
     return len(seen.cameras) + len(seen.targets)
 
 
-def _views(seen: Sightings) -> list[View]:
+def _views(seen: Sightings) -> list[_View]:
     """Return where every target is in every image of every camera, where the image settles it."""
     key = (seen.image * len(seen.cameras) + seen.camera) * len(seen.targets) + seen.target
     order = np.argsort(key, kind='stable')
@@ -93,14 +93,14 @@ def _views(seen: Sightings) -> list[View]:
             continue
         image, body = int(seen.image[rows[0]]), len(seen.cameras) + t
         if seen.cameras[c].mount == 'world':
-            out.append(View(image, c, body, pose))
+            out.append(_View(image, c, body, pose))
         else:
-            out.append(View(image, body, c, np.asarray(np.linalg.inv(pose), float)))
+            out.append(_View(image, body, c, np.asarray(np.linalg.inv(pose), float)))
     return out
 
 
 def _joined(
-    views: Sequence[View], known: dict[int, Array], tool: dict[int, Array]
+    views: Sequence[_View], known: dict[int, Array], tool: dict[int, Array]
 ) -> dict[int, Array]:
     """Return bodies that were not known, from views at stamps at which the tool is."""
     tried: dict[int, list[Array]] = {}

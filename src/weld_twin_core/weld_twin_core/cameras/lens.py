@@ -25,7 +25,7 @@ UNKNOWNS = 9
 """Numbers of a lens that may be off: fx fy cx cy [px] and k1 k2 p1 p2 k3."""
 _NEAR = 1e-6
 """Depth [m] that counts as none; keeps a point in the plane of the lens from a division by zero."""
-ROUNDS = 20
+_ROUNDS = 20
 """Newton steps at the most from a pixel to its ray; four are enough for lenses of usual cameras."""
 _SETTLED = 1e-12
 """Change of a ray at which its search ends."""
@@ -81,7 +81,7 @@ class Lens:
         """Return where rays of pixels (N, 2) meet the plane one ahead, (N, 2), by Newton's way."""
         wanted = (np.asarray(pixels, dtype=float) - self.centre) / self.focal
         flat = wanted.copy()
-        for _ in range(ROUNDS):
+        for _ in range(_ROUNDS):
             bent, turn, _ = self._bent(flat)
             step = np.linalg.solve(turn, (wanted - bent)[..., None])[..., 0]
             flat = flat + step

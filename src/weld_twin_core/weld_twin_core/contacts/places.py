@@ -15,7 +15,7 @@ from .contact import Tie
 from .contacts import Contacts
 from .surfaces import Surface
 
-ROUNDS = 8
+_ROUNDS = 8
 """Steps at the most; two are enough for points, five for faces found at first sight."""
 _SETTLED = 1e-9
 """Step [m, rad] below which a place stays."""
@@ -141,7 +141,7 @@ def places(contacts: Contacts, points: Array) -> Places:
         value = None if contacts.value is None else contacts.value[index]
         surfaces.append(Surface.start(contact, points[index], value))
     now = Places(contacts, tuple(surfaces))
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         step = _step(now, points)
         now = now.moved(step)
         if np.abs(step).max(initial=0.0) < _SETTLED:

@@ -27,12 +27,12 @@ def _constant(view: View, index: int) -> Array:
     return np.zeros(np.shape(view.q[..., index]))
 
 
-def angle(view: View, index: int) -> Array:
+def _angle(view: View, index: int) -> Array:
     """Return the joint's position, shape (..., N) [rad or m]."""
     return view.joint(index)
 
 
-def direction(view: View, index: int) -> Array:
+def _direction(view: View, index: int) -> Array:
     """Return -1 to 1, which way the joint moves; 0 at rest, shape (..., N)."""
     return np.tanh(view.qd[..., index] / AT_REST)
 
@@ -60,7 +60,7 @@ def _temperature(view: View, index: int) -> Array:
     return view.temperature
 
 
-def time(view: View, index: int) -> Array:
+def _time(view: View, index: int) -> Array:
     """Return the time since the first stamp, shape (N,) [s]."""
     return view.elapsed
 
@@ -68,12 +68,12 @@ def time(view: View, index: int) -> Array:
 _Quantity = Callable[[View, int], Array]
 QUANTITIES: dict[str, _Quantity] = {
     'constant': _constant,
-    'angle': angle,
-    'direction': direction,
+    'angle': _angle,
+    'direction': _direction,
     'speed': _speed,
     'load': load,
     'temperature': _temperature,
-    'time': time,
+    'time': _time,
 }
 """What a curve may run over; the second argument is the joint's index."""
 
@@ -125,7 +125,7 @@ def _check_knots(name: str, over: str, knots: Sequence[float], count: int) -> No
 _KNOT = 0.1
 """Least distance [rad] of the knots of a joint's curve: ripple of the orders up to ten or so bends
 within some tenths of a radian. A joint that travels less has no curve."""
-LEAST_KNOTS, MOST_KNOTS = 2, 8
+_LEAST_KNOTS, _MOST_KNOTS = 2, 8
 """Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
 
 
@@ -135,8 +135,8 @@ class _Search(SearchHooks):
     def bend(self, joint: str, angles: Array) -> JointCurve | None:
         """Return a level curve over the angle, None where its knots would be too near."""
         low, high = float(angles.min()), float(angles.max())
-        count = min(int((high - low) / _KNOT), MOST_KNOTS)
-        if count < LEAST_KNOTS:
+        count = min(int((high - low) / _KNOT), _MOST_KNOTS)
+        if count < _LEAST_KNOTS:
             return None
         return self.kind(
             joint, np.zeros(count + 1), tuple(np.linspace(low, high, count + 1).tolist())

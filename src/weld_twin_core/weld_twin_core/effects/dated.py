@@ -28,7 +28,7 @@ from .wording import base_frame, frame, radians
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
 
-T = TypeVar('T', bound='_Timed')
+_T = TypeVar('T', bound='_Timed')
 
 
 class _Timed(LinearEffect):
@@ -43,7 +43,7 @@ class _Timed(LinearEffect):
     def share(self, view: View) -> Array:
         """Return how much of the error there is, shape as the view's stamps."""
 
-    def recounted(self: T, later: float) -> T:
+    def recounted(self: _T, later: float) -> _T:
         """Return the same with its instant counted from an epoch that is later by so much [s]."""
         return replace(self, **{self.since: getattr(self, self.since) - later})
 

@@ -43,7 +43,7 @@ else:  # what tools see; at run time `register` makes the dataclass
         return lambda function: function
 
 
-E = TypeVar('E', bound='Effect')
+_E = TypeVar('E', bound='Effect')
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class Effect(Parametric, ABC):
         """Return the linear features of this instance; their combinations start a fit."""
         return [shift for shift in self.gradient(view) if shift is not None]
 
-    def from_atoms(self: E, coefficients: Array) -> E:
+    def from_atoms(self: _E, coefficients: Array) -> _E:
         """
         Return the instance that a combination of `atoms` stands for, inside its bounds.
 
@@ -304,7 +304,7 @@ REGISTRY: dict[str, type[Effect]] = {}
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
-def register(effect: type[E]) -> type[E]:
+def register(effect: type[_E]) -> type[_E]:
     """
     Make an effect known by its name, from this package or from user code.
 

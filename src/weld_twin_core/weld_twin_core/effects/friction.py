@@ -26,7 +26,7 @@ from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, FitHooks, Hooked, MemoryEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
-SHORTEST, LONGEST = 3e-5, 1.8e-3
+_SHORTEST, _LONGEST = 3e-5, 1.8e-3
 """Pre-sliding travels [rad] that a search considers: a longer one is a loop, `hysteresis`."""
 _UNEVEN = 0.6
 """Asymmetry beyond which one direction would hardly rub at all. A judgement."""
@@ -46,7 +46,7 @@ class _Fit(FitHooks):
         if zoom or view.static:
             return None
         unit = view.radian(view.robot.index(self.effect.joint))
-        travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
+        travels = unit * np.geomspace(_SHORTEST, _LONGEST, 7)
         each = [replace(self.effect, windup=1.0, travel=float(travel)) for travel in travels]
         many = replace(self.effect, windup=1.0, travel=travels)
         return each, many.run(view)[0]['q', view.robot.index(self.effect.joint)]

@@ -98,16 +98,16 @@ class _Hooks:
         self.kind, self.effect = kind, effect
 
 
-G = TypeVar('G', bound=_Hooks, covariant=True)
+_G = TypeVar('G', bound=_Hooks, covariant=True)
 
 
-class Hooked(Generic[G]):
+class Hooked(Generic[_G]):
     """An attribute of effects that is a group of questions to the effect it is asked of."""
 
-    def __init__(self, group: type[G]) -> None:
+    def __init__(self, group: type[_G]) -> None:
         self.group = group
 
-    def __get__(self, effect: Any, kind: Any) -> G:
+    def __get__(self, effect: Any, kind: Any) -> _G:
         """Return the group, with the effect that is asked; with the kind alone, where it is."""
         return self.group(kind, effect)
 

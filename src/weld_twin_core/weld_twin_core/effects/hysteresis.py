@@ -29,7 +29,7 @@ from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, FitHooks, Hooked, MemoryEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
-SHORTEST, LONGEST = 4e-3, 0.3
+_SHORTEST, _LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
 
 
@@ -41,7 +41,7 @@ class _Fit(FitHooks):
         if zoom:
             return None
         i = view.robot.index(self.effect.joint)
-        travels = view.radian(i) * np.geomspace(SHORTEST, LONGEST, 10)
+        travels = view.radian(i) * np.geomspace(_SHORTEST, _LONGEST, 10)
         z = Hysteresis(self.effect.joint, 1.0, travels)._loop(view.joint(i), None)[0]
         return [Hysteresis(self.effect.joint, 1.0, float(travel)) for travel in travels], -z
 

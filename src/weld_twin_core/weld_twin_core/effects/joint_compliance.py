@@ -25,7 +25,7 @@ from .effect import Effect, Hooked, LinearEffect, SearchHooks, Traits, TwinHooks
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 from .wording import metres, radians, size
 
-SOFTEST = 3e-4
+_SOFTEST = 3e-4
 """Compliance of the softest joint [rad/(N m)] of an arm that is heavy enough for it."""
 _SAG = np.pi / 180.0
 """Most that a joint sags under its arm's own weight [rad]: a degree is seen by the eye. A judgement."""
@@ -47,7 +47,7 @@ def lightness(robot: Robot) -> float:
     if not mass * reach:
         return 1.0
     moment = 0.5 * (mass + robot.payload_mass) * np.linalg.norm(STANDARD_GRAVITY) * reach
-    return max(_SAG / float(moment) / SOFTEST, 1.0)
+    return max(_SAG / float(moment) / _SOFTEST, 1.0)
 
 
 class _Twin(TwinHooks):
@@ -101,7 +101,7 @@ class JointCompliance(LinearEffect):
             range=Plausible(
                 3e-5,
                 -1e-5,
-                SOFTEST,
+                _SOFTEST,
                 'derived: 3,000 N m/rad is the softest gear of a small cobot; see `lightness` for '
                 'smaller arms; a little below zero is a controller that mends too much',
                 times=lightness,

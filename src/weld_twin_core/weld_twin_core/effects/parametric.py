@@ -15,7 +15,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .view import Parameter
 
-P = TypeVar('P', bound='Parametric')
+_P = TypeVar('P', bound='Parametric')
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Parametric:
         out.setflags(write=False)
         return out
 
-    def with_vector(self: P, vector: Array) -> P:
+    def with_vector(self: _P, vector: Array) -> _P:
         """Return the same with other components, shape (P,) or draws (D, P)."""
         wanted = np.asarray(vector, dtype=np.float64)
         values: dict[str, Any] = {}

@@ -11,7 +11,7 @@ import numpy as np
 from .effect import Effect, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
-FINEST, COARSEST = 1e-4, 2e-2
+_FINEST, _COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
 _PEAKS = 3
 """Steps that a search starts from; beside the right one stand its half and its double."""
@@ -20,9 +20,9 @@ _PHASE = 1.0 / 16.0
 _QUICK = (5, 9, 15, 25, 27, 45)
 """Lengths, doubled often enough, whose spectrum is quick: that of a power of two, a million, lies so
 in memory that it takes three times as long, a good part of a diagnosis of some stations."""
-ZOOM, ZOOMS = 16, 3
+_ZOOM, _ZOOMS = 16, 3
 """Steps tried to either side at each closer look, and how many looks there are."""
-MOST = 2000
+_MOST = 2000
 """Steps tried at once at most, which bounds memory."""
 
 
@@ -30,7 +30,7 @@ class _Search(SearchHooks):
     def trials(self, view: View, joint: str | None) -> float:
         """Return how many steps the spectrum tells apart."""
         travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
-        return max(1.0, travel / FINEST)
+        return max(1.0, travel / _FINEST)
 
 
 class _Fit(FitHooks):
@@ -45,12 +45,12 @@ class _Fit(FitHooks):
         """
         q = view.joint(view.robot.index(self.effect.joint))
         travel, far = float(np.ptp(q)), float(np.abs(q).max())
-        if zoom == ZOOMS or self.effect.step <= 0.0 or travel <= 0.0:
+        if zoom == _ZOOMS or self.effect.step <= 0.0 or travel <= 0.0:
             return None
         fine = _PHASE / far
-        half = 1.0 / (travel * fine) if zoom == 0 else float(ZOOM)
-        offset = np.arange(-min(int(half) + 1, MOST // 2), min(int(half) + 1, MOST // 2) + 1)
-        steps = 1.0 / (1.0 / self.effect.step + offset * fine / (0.5 * ZOOM) ** zoom)
+        half = 1.0 / (travel * fine) if zoom == 0 else float(_ZOOM)
+        offset = np.arange(-min(int(half) + 1, _MOST // 2), min(int(half) + 1, _MOST // 2) + 1)
+        steps = 1.0 / (1.0 / self.effect.step + offset * fine / (0.5 * _ZOOM) ** zoom)
         steps = steps[steps > 0.0]
         many = Quantization(self.effect.joint, steps)
         displaced = many.displace(view)[('q', view.robot.index(self.effect.joint))]
@@ -117,17 +117,17 @@ class Quantization(Effect):
             return
         q = view.joint(view.robot.index(str(joint)))
         travel = float(np.ptp(q))
-        if travel < 4.0 * FINEST:
+        if travel < 4.0 * _FINEST:
             return
-        cell = 0.25 * FINEST
+        cell = 0.25 * _FINEST
         bins = np.rint((q - q.min()) / cell).astype(int)
         least = 4 * (int(bins.max()) + 1)
         lengths = _QUICK if view.static else (1,)
         size = min(odd << (-(-least // odd) - 1).bit_length() for odd in lengths)
         spectrum = np.fft.rfft(np.bincount(bins, pull, minlength=size))
-        power = np.abs(spectrum[: int(size * cell / FINEST) + 2]) ** 2
+        power = np.abs(spectrum[: int(size * cell / _FINEST) + 2]) ** 2
         step = size * cell / np.maximum(np.arange(power.size), 1)
-        power[(step < FINEST) | (step > min(COARSEST, 0.5 * travel))] = 0.0
+        power[(step < _FINEST) | (step > min(_COARSEST, 0.5 * travel))] = 0.0
         for _ in range(_PEAKS):
             k = int(np.argmax(power))
             if power[k] <= 0.0:

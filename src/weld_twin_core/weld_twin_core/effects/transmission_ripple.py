@@ -25,7 +25,7 @@ _BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
 """Orders whose amplitudes are expected to be alike: up to a band's last order. Amplitudes fall off
 with the order, so bands widen with it; where they end is a judgement."""
 
-MANY_ORDERS, SPARSE = 8, 3
+_MANY_ORDERS, _SPARSE = 8, 3
 """Whole orders from which on their sum is worked out by powers of exp(i theta), and how many times as
 many powers as orders there may be: a sine takes as long as some five products."""
 
@@ -175,10 +175,10 @@ class TransmissionRipple(Effect):
         """Return whether there are so many whole orders that powers are quicker than sines."""
         shapes = {np.shape(getattr(self, p.name)) for p in self.parameters}
         orders = self.search.orders()
-        if len(shapes) > 1 or orders.size < MANY_ORDERS or orders.ndim != 1:
+        if len(shapes) > 1 or orders.size < _MANY_ORDERS or orders.ndim != 1:
             return False
         whole = (orders == np.rint(orders)).all() and orders.min() > 0.0
-        return bool(whole and orders.max() <= SPARSE * orders.size)
+        return bool(whole and orders.max() <= _SPARSE * orders.size)
 
     def _all_orders(self, view: View) -> Array:
         orders = self.search.orders().astype(int)

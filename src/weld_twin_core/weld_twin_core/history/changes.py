@@ -32,7 +32,7 @@ from .observation import Observation, Series, series_of
 
 _YEAR = 365.25
 """Days of a season."""
-MOST = 8
+_MOST = 8
 """Changes looked for; an arm with more of them was rebuilt."""
 _ALIKE = 6.0
 """Sum of squares by which another coordinate may explain less and still be reported as alike:
@@ -89,7 +89,7 @@ class Change:
     """Of a step: earliest day from which a trend explains it as well; None where none does."""
 
 
-class Term(NamedTuple):
+class _Term(NamedTuple):
     """A shape on a coordinate that was taken in."""
 
     shape: _Shape
@@ -132,8 +132,8 @@ def changes(
     # What use cannot change has to explain more, if it is known what use can.
     rare = np.array([bool(likely) and name not in {*named, *likely} for name in series.names])
     look = _Look(series, shapes, simple[:, None] + 2.0 * _LIKELY * rare, sooner)
-    taken: list[tuple[Term, Change]] = []
-    while len(taken) < MOST:
+    taken: list[tuple[_Term, Change]] = []
+    while len(taken) < _MOST:
         more = look.next([result for result, _ in taken])
         if more is None:
             break
@@ -151,24 +151,24 @@ class _Look(NamedTuple):
     sooner: Array
     """Log prior odds of a coordinate before others that explain as much, shape (P,)."""
 
-    def next(self, result: Sequence[Term]) -> tuple[Term, Change] | None:
+    def next(self, result: Sequence[_Term]) -> tuple[_Term, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""
         system = _System(self.series, result)
         gain = np.array([system.gains(shape) for shape in self.shapes])
         row, column = np.unravel_index(int(np.argmax(gain - self.bar)), gain.shape)
         best = int(row), int(column)
         # Beside the change: without it, the change itself would count as scatter.
-        scatter = _System(self.series, [*result, Term(self.shapes[best[0]], best[1])]).scatter
+        scatter = _System(self.series, [*result, _Term(self.shapes[best[0]], best[1])]).scatter
         gain /= scatter
         if gain[best] <= self.bar[best]:
             return None
         return _described(self.series, system, self.shapes, gain, best, self.sooner, scatter)
 
-    def settled(self, taken: Sequence[tuple[Term, Change]]) -> list[tuple[Term, Change]]:
+    def settled(self, taken: Sequence[tuple[_Term, Change]]) -> list[tuple[_Term, Change]]:
         """Return the changes that are more than chance, each looked for once more beside all others."""
         if len(taken) < 2:
             return list(taken)
-        out: list[tuple[Term, Change]] = []
+        out: list[tuple[_Term, Change]] = []
         for k in range(len(taken)):
             again = self.next([result for result, _ in (*out, *taken[k + 1 :])])
             out += [again] if again else []
@@ -192,7 +192,7 @@ def outlook(
         return None
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
-    taken = [Term(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
+    taken = [_Term(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
     return Outlook(*_System(series, taken).now(series.names.index(name)))
 
 
@@ -241,7 +241,7 @@ def _shapes(days: Array) -> list[_Shape]:
 class _System:
     """The arm as it was at first and the changes found so far, fitted together."""
 
-    def __init__(self, series: Series, result: Sequence[Term]) -> None:
+    def __init__(self, series: Series, result: Sequence[_Term]) -> None:
         self._series, self._terms = series, tuple(result)
         self._sizes: dict[tuple[str, int], tuple[Array, Array]] = {}
         first = series.precision.sum(axis=0)
@@ -293,7 +293,7 @@ class _System:
         own = np.einsum('wm,wn,wj->jmn', x, x, series.precision[:, places, places])
         return cross, own, x.T @ series.weighted[:, places]
 
-    def _among(self, one: Term) -> list[Array]:
+    def _among(self, one: _Term) -> list[Array]:
         """Return the products of a change found with those found before it, and with itself."""
         series, out = self._series, []
         for other in self._terms:
@@ -361,7 +361,7 @@ def _described(
     best: tuple[int, int],
     sooner: Array,
     scatter: float,
-) -> tuple[Term, Change]:
+) -> tuple[_Term, Change]:
     """Return the simplest change that explains as much as the best by its prior, and what else would."""
     kind, top = shapes[best[0]].kind, gain[best]
     same = [k for k, each in enumerate(shapes) if each.kind == kind]
@@ -376,7 +376,7 @@ def _described(
     near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
     ranked = sorted(odds, key=lambda j: -odds[j])
     others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
-    return Term(shape, place), Change(
+    return _Term(shape, place), Change(
         series.names[place],
         kind,
         float(series.days[shape.begin]),

@@ -35,7 +35,7 @@ _DWELL = 0.5
 """Seconds an arm stands at least, so that it has settled when the second half begins."""
 _LOOK = 0.05
 """Spacing [s] at which motion is looked at for stops; ten looks to the shortest."""
-END = 0.1
+_END = 0.1
 """Share of a stop left out at its end, where clocks that differ would see the arm leave."""
 
 
@@ -119,7 +119,7 @@ def _mean_stop(
 ) -> _Stop | None:
     """Return the mean of the later half of a stop, without its last moments."""
     late = start + 0.5 * (end - start)
-    rows = (measured.t >= late) & (measured.t <= end - END * (end - start))
+    rows = (measured.t >= late) & (measured.t <= end - _END * (end - start))
     if not rows.any():
         return None
     rotation = None

@@ -157,7 +157,7 @@ def path_performance(
     goal = readonly(command, (None, 3), 'command path')
     crossed = np.stack(
         [
-            normal_plane_crossings(path, goal, tangent, f'cycle {k}')
+            _normal_plane_crossings(path, goal, tangent, f'cycle {k}')
             for k, path in enumerate(attained)
         ]
     )
@@ -176,7 +176,7 @@ def along_path(crossed: Array, command: Array) -> tuple[Array, Array]:
     return np.linalg.norm(crossed.mean(axis=0) - command, axis=-1), _repeatability(crossed)
 
 
-def normal_plane_crossings(
+def _normal_plane_crossings(
     path: ArrayLike, command: ArrayLike, tangent: ArrayLike, name: str = 'the path'
 ) -> Array:
     """

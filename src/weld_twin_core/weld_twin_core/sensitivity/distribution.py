@@ -16,7 +16,7 @@ from scipy.special import ndtr, ndtri
 from ..arrays import Array
 from ..errors import ModelError
 
-KINDS: dict[str, tuple[str, ...]] = {
+_KINDS: dict[str, tuple[str, ...]] = {
     'normal': ('mean', 'std'),
     'uniform': ('low', 'high'),
     'triangular': ('low', 'mode', 'high'),
@@ -32,19 +32,19 @@ class Distribution:
     """A distribution, cut off at the bounds of the parameter."""
 
     kind: str
-    """One of `KINDS`."""
+    """One of `_KINDS`."""
     numbers: tuple[float, ...]
-    """In the order of `KINDS`, in the unit of the parameter."""
+    """In the order of `_KINDS`, in the unit of the parameter."""
     lower: float = -np.inf
     upper: float = np.inf
     """Values outside have no probability."""
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
+        if self.kind not in _KINDS:
             raise ModelError(
-                f'a distribution must be one of {", ".join(KINDS)}, got {self.kind!r}'
+                f'a distribution must be one of {", ".join(_KINDS)}, got {self.kind!r}'
             )
-        names = KINDS[self.kind]
+        names = _KINDS[self.kind]
         if len(self.numbers) != len(names) or not np.isfinite(self.numbers).all():
             raise ModelError(
                 f'a {self.kind} distribution needs {", ".join(names)}, got {self.numbers}'
@@ -66,7 +66,9 @@ class Distribution:
         return last if self.kind == 'normal' else last - first
 
     def _text(self) -> str:
-        return ', '.join(f'{k} {v:g}' for k, v in zip(KINDS[self.kind], self.numbers, strict=True))
+        return ', '.join(
+            f'{k} {v:g}' for k, v in zip(_KINDS[self.kind], self.numbers, strict=True)
+        )
 
     def _below(self, value: float) -> float:
         """Return the probability below a value."""
@@ -117,23 +119,23 @@ class Distribution:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the keys of a tolerance file."""
-        numbers = dict(zip(KINDS[self.kind], map(float, self.numbers), strict=True))
+        numbers = dict(zip(_KINDS[self.kind], map(float, self.numbers), strict=True))
         return {'distribution': self.kind, **numbers}
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any], lower: float, upper: float) -> Distribution:
         """Build one from a tolerance file's keys, within bounds; ModelError where a key is wrong."""
         kind = str(data.get('distribution', 'normal'))
-        if kind not in KINDS:
-            raise ModelError(f'a distribution must be one of {", ".join(KINDS)}, got {kind!r}')
-        unknown = sorted(set(map(str, data)) - {'distribution', *KINDS[kind]})
+        if kind not in _KINDS:
+            raise ModelError(f'a distribution must be one of {", ".join(_KINDS)}, got {kind!r}')
+        unknown = sorted(set(map(str, data)) - {'distribution', *_KINDS[kind]})
         if unknown:
             raise ModelError(
-                f'a {kind} distribution takes {", ".join(KINDS[kind])}, not {unknown[0]!r}'
+                f'a {kind} distribution takes {", ".join(_KINDS[kind])}, not {unknown[0]!r}'
             )
-        values = {**{k: v for k, v in _DEFAULTS.items() if k in KINDS[kind]}, **data}
+        values = {**{k: v for k, v in _DEFAULTS.items() if k in _KINDS[kind]}, **data}
         try:
-            numbers = tuple(float(values[key]) for key in KINDS[kind])
+            numbers = tuple(float(values[key]) for key in _KINDS[kind])
         except KeyError as error:
             raise ModelError(f'a {kind} distribution needs the key {error}') from None
         except (TypeError, ValueError):

@@ -116,8 +116,8 @@ class SobolDesign:
     def samples(self) -> Array:
         """Return probabilities of every input, shape (N (G + 2), P)."""
         inputs = len(self.names)
-        first, second = base_pair(inputs, self.base_samples, self.seed)
-        return mixed(first, second, self.groups).reshape(-1, inputs)
+        first, second = _base_pair(inputs, self.base_samples, self.seed)
+        return _mixed(first, second, self.groups).reshape(-1, inputs)
 
     def indices(self, results: Array) -> SobolIndices:
         """Return the indices of results in the order of `samples`; DataError for wrong or equal ones."""
@@ -131,10 +131,10 @@ class SobolDesign:
         if np.ptp(values) == 0.0:
             raise DataError('the result is the same in all runs; there is no scatter to share out')
         runs = values.reshape(self.base_samples, block)
-        first, total = sobol_estimates(runs)
+        first, total = _estimates(runs)
         rng = np.random.default_rng(self.seed)
-        first_half, total_half = sobol_half_widths(runs, _CONFIDENCE, rng)
-        before = sobol_estimates(runs[: self.base_samples // 2])[1]
+        first_half, total_half = _half_widths(runs, _CONFIDENCE, rng)
+        before = _estimates(runs[: self.base_samples // 2])[1]
         change = float(np.abs(total - before).max())
         settled = max(change, float(total_half.max())) < _SETTLED
         return SobolIndices(
@@ -183,7 +183,7 @@ def sobol_indices(
     return design.indices(function(design.samples()))
 
 
-def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
+def _base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
     """Return two independent sets of probabilities (base, inputs), base a power of two."""
     from scipy.stats import qmc  # half a second, for nothing but this
 
@@ -191,9 +191,9 @@ def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
     return pair[:, :inputs], pair[:, inputs:]
 
 
-def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> Array:
+def _mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> Array:
     """
-    Return the runs of Saltelli's design, shape (base, G + 2, inputs), of the sets of `base_pair`.
+    Return the runs of Saltelli's design, shape (base, G + 2, inputs), of the sets of `_base_pair`.
 
     Of the runs of one base sample the first is that of ``first``, the last that of ``second``, and
     run 1 + g is the first with the inputs of group g from the second. Every input is a group of
@@ -209,7 +209,7 @@ def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> A
     return out
 
 
-def sobol_estimates(results: Array) -> tuple[Array, Array]:
+def _estimates(results: Array) -> tuple[Array, Array]:
     """Return first-order and total indices, shape (G,), of results (base, G + 2)."""
     own, total, ends = _terms(results)
     weights = np.full((1, len(results)), 1.0 / len(results))
@@ -217,7 +217,7 @@ def sobol_estimates(results: Array) -> tuple[Array, Array]:
     return first[0], whole[0]
 
 
-def sobol_half_widths(
+def _half_widths(
     results: Array, confidence: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Return half-widths of both indices' intervals, (G,), by the bootstrap [2]_."""

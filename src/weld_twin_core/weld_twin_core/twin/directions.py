@@ -13,7 +13,7 @@ from ..arrays import Array, readonly
 from ..effects.effect import Effect
 from .features import Features
 
-AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
+_AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
 CURVE = 'curve of '
 """How the names of a curve's heights begin."""
 GIVE = 'give of '
@@ -71,9 +71,9 @@ class Directions:
         """Return the coordinates' names, alike in every diagnosis: 'joint_offset elbow_joint 0'."""
         out = []
         if 'base' in self.frames:
-            out += [f'base {k}.{axis}' for k in range(self.setups) for axis in AXES]
+            out += [f'base {k}.{axis}' for k in range(self.setups) for axis in _AXES]
         if 'tool' in self.frames:
-            out += [f'tool.{axis}' for axis in AXES]
+            out += [f'tool.{axis}' for axis in _AXES]
         for effect, size in zip(self.effects, self.sizes, strict=True):
             where = f' {effect.site}' if effect.site else ''
             # Two couplings of one joint differ in the joint that they come from.

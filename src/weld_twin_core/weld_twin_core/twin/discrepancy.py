@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
 
-ELSEWHERE = 2.0
+_ELSEWHERE = 2.0
 """A model is off by so many times as much as its own account where nothing was recorded, for its account
 is of the causes that it has: on two arms under a tracker, and on sealed cases, by 1.0 to 3.0."""
 
@@ -90,7 +90,7 @@ class Discrepancy:
         return np.asarray(self.swings * here.shaken.T)
 
     def grown(self, here: Where) -> Array:
-        """Return how many times as large all is, up to `ELSEWHERE` where nothing was recorded, (M,)."""
+        """Return how many times as large all is, up to `_ELSEWHERE` where nothing was recorded, (M,)."""
         outside = (here.beyond - here.margins).max(axis=1, initial=0.0)
         apart = np.maximum(np.minimum(outside / self.reach, 1.0), here.unlike)
-        return np.asarray(1.0 + (ELSEWHERE - 1.0) * apart)
+        return np.asarray(1.0 + (_ELSEWHERE - 1.0) * apart)

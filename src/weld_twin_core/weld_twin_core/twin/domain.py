@@ -16,29 +16,29 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..recording import Recording
 
-LEAST_MARGIN = 0.02
+_LEAST_MARGIN = 0.02
 """A joint this near [rad or m] to where it was recorded counts as recorded there: one degree."""
-MOST_MARGIN = 0.8
+_MOST_MARGIN = 0.8
 """Never farther than this [rad or m], however few stations there are."""
-LEFT_OUT = 0.95
+_LEFT_OUT = 0.95
 """Share of the measurements, each left out in turn, that shall lie inside what the others show."""
-WIDER = 1.5
+_WIDER = 1.5
 """The margin in units of what that takes: with six joints and few stations the next one lies
 outside more often than the last one did."""
-AS_FAR_AGAIN = 1.0
+_AS_FAR_AGAIN = 1.0
 """From fewer than 19 measurements no distance can be read that holds 95 of 100: a joint then counts
 as recorded as far beyond as it moved, in units of its range."""
-SPACINGS = 3.0
+_SPACINGS = 3.0
 """At least so many mean distances between neighbours: of stations drawn evenly a further one lies
 nearer than that to one of them, joint by joint, in 95 of 100 cases."""
-SPEED_MARGIN = (1.25, 0.05)
+_SPEED_MARGIN = (1.25, 0.05)
 """Faster than recorded from this factor and this much [rad/s or m/s] on: differences ring."""
-LOAD_MARGIN = (1.25, 5.0)
+_LOAD_MARGIN = (1.25, 5.0)
 """The same of force [N] and torque [N m]: force sensors drift by some newtons."""
-WARM_MARGIN = 2.0
+_WARM_MARGIN = 2.0
 """Warmer or colder than recorded from here on [K]; thermometers stand anywhere."""
 
-FADES = 4.0
+_FADES = 4.0
 """Margins beyond the first over which doubt sets in: commands must not jump at a border."""
 
 
@@ -136,7 +136,7 @@ class Domain:
         return cls(
             robot.joint_names,
             tuple(_intervals(q[:, i], gap) for i, gap in enumerate(gaps)),
-            tuple(float(m) for m in np.minimum(gaps, MOST_MARGIN)),
+            tuple(float(m) for m in np.minimum(gaps, _MOST_MARGIN)),
             tuple(bool(turn) for turn in turns),
             speeds,
             _load(recordings),
@@ -173,7 +173,7 @@ class Domain:
         doubt = np.trace(covariance, axis1=1, axis2=2)
         best = size / np.maximum(size + doubt, 1e-300)
         beyond = (self.beyond(q) / np.array(self.margins)).max(axis=1)
-        apart = np.clip((beyond - 1.0) / FADES, 0.0, 1.0)
+        apart = np.clip((beyond - 1.0) / _FADES, 0.0, 1.0)
         smooth = apart**2 * (3.0 - 2.0 * apart)
         return np.asarray(1.0 - smooth * (1.0 - best))
 
@@ -195,7 +195,7 @@ class Domain:
         return sorted(
             Outside(first, last, why(slice(first, last + 1)))
             for beyond, why in looks
-            for first, last in runs(beyond)
+            for first, last in _runs(beyond)
         )
 
     def unlike(self, recording: Recording, at: Array) -> NDArray[np.bool_]:
@@ -252,7 +252,7 @@ class Domain:
 
     def _speeds(self, speed: Array) -> _Look:
         known = np.zeros(len(self.joints)) if self.speeds is None else np.array(self.speeds)
-        limit = SPEED_MARGIN[0] * known + SPEED_MARGIN[1]
+        limit = _SPEED_MARGIN[0] * known + _SPEED_MARGIN[1]
 
         def why(part: slice) -> str:
             i = int((speed[part] / limit).max(axis=0).argmax())
@@ -280,12 +280,12 @@ class Domain:
                 most = f'{size[part].max():.3g} {unit}, at most {known:.3g} {unit} was recorded'
                 return f'the {name} on the tool is up to {most}'
 
-            yield size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1], why
+            yield size > _LOAD_MARGIN[0] * known + _LOAD_MARGIN[1], why
 
     def _warmth(self, temperature: Array, low: float, high: float) -> _Look:
         off = np.maximum(low - temperature, temperature - high)
         return (
-            off > WARM_MARGIN,
+            off > _WARM_MARGIN,
             lambda part: (
                 f'it is {off[part].max():.2g} K beyond the {low:.1f} to {high:.1f} degC that were '
                 'recorded'
@@ -338,7 +338,7 @@ def as_seen(
     )
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
     """Return first and last index of every run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
@@ -360,11 +360,11 @@ def _gaps(q: Array) -> Array:
     apart = np.empty_like(nearest)
     np.put_along_axis(apart, order, nearest, axis=0)
     worst = np.sort((np.where(np.isfinite(apart), apart, 0.0) / span).max(axis=1))
-    at = min(int(np.ceil(LEFT_OUT * (worst.size + 1))), worst.size) - 1
-    share = max(WIDER * worst[at], SPACINGS / max(worst.size - 1, 1))
-    if np.ceil(LEFT_OUT * (worst.size + 1)) > worst.size:
-        share = max(share, AS_FAR_AGAIN)
-    return np.asarray(np.maximum(LEAST_MARGIN, share * span))
+    at = min(int(np.ceil(_LEFT_OUT * (worst.size + 1))), worst.size) - 1
+    share = max(_WIDER * worst[at], _SPACINGS / max(worst.size - 1, 1))
+    if np.ceil(_LEFT_OUT * (worst.size + 1)) > worst.size:
+        share = max(share, _AS_FAR_AGAIN)
+    return np.asarray(np.maximum(_LEAST_MARGIN, share * span))
 
 
 def _near_the_middle(q: Array, turns: NDArray[np.bool_]) -> Array:

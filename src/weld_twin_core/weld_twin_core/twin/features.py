@@ -24,10 +24,10 @@ from .memory import Picker
 from .stages import Evaluation, load_torque
 from .twin import Twin
 
-SLOW = 0.03
+_SLOW = 0.03
 """Half of the time [s] over which a joint's acceleration is taken: a spring that swings at 10 to 50 Hz
 follows no faster, and neither a corner of a program nor an encoder's noise is an acceleration."""
-RINGS = 0.1
+_RINGS = 0.1
 """Time [s] after an acceleration in which the tool still swings: one to five times at 10 to 50 Hz."""
 Remembered = tuple[bytes, str, bytes]
 """Instants looked at, effect and its parameters to the last digit."""
@@ -89,12 +89,12 @@ class Features:
     @cached_property
     def shaken(self) -> Array:
         """Return the largest size of `acceleration` that a spring still rings of, shape (M, n)."""
-        lags = np.linspace(0.0, RINGS, 5)
+        lags = np.linspace(0.0, _RINGS, 5)
         return np.asarray(np.max([np.abs(self._accelerated(lag)) for lag in lags], axis=0))
 
     def _accelerated(self, before: float) -> Array:
         motion, t = self.recording.joints, self.run.view.t - before
-        low, high = (np.clip(t + way, *motion.t[[0, -1]]) for way in (-SLOW, SLOW))
+        low, high = (np.clip(t + way, *motion.t[[0, -1]]) for way in (-_SLOW, _SLOW))
         span = (high - low)[:, None]
         change = motion.at(high)[1] - motion.at(low)[1]
         return np.divide(change, span, out=np.zeros_like(change), where=span > 0.0)

@@ -12,9 +12,9 @@ import numpy as np
 from ..arrays import Array, readonly
 from ..errors import DataError
 
-FINE = 0.008
+_FINE = 0.008
 """Longest step [s] at which a motion is looked at: 125 a second, as controllers are commanded."""
-MOST = 1500
+_MOST = 1500
 """Looks at a long motion, so that an hour of it costs no more than 12 s at the finest."""
 
 
@@ -61,7 +61,7 @@ class Course(NamedTuple):
 def fine_times(goal: Goal) -> Array:
     """Return stamps at which a goal's motion is looked at, its points among them, shape (K,) [s]."""
     t = goal.t
-    step = max(FINE, float(t[-1] - t[0]) / MOST)
+    step = max(_FINE, float(t[-1] - t[0]) / _MOST)
     parts = [
         np.linspace(a, b, max(int(np.ceil((b - a) / step)), 1), endpoint=False)
         for a, b in pairwise(t)

@@ -12,13 +12,13 @@ from .features import Features
 from .posterior import Expected, Posterior
 from .twin import Twin
 
-EVERY = 0.1
+_EVERY = 0.1
 """Shortest time between two looks [s]. One takes some milliseconds, so that this costs some
 per cent of a core at any rate of joint states; in between the covariance is held, while a tool at
 1 m/s goes on by 100 mm and its covariance changes by some per cent."""
-MOVED = 0.005
+_MOVED = 0.005
 """Least motion of a joint [rad or m] that is worth another look."""
-LEAD = np.linspace(-0.5, 0.0, 6)
+_LEAD = np.linspace(-0.5, 0.0, 6)
 """Motion at constant speed before the sample [s], so that lag and play are as in the middle of a
 motion. No joint gives, as none is accelerated: a look is held for longer than that lasts."""
 
@@ -61,18 +61,18 @@ class LivePosterior:
         since = t - self._time
         if self._q is None or since < 0.0:
             speed = np.zeros_like(q)
-        elif since >= EVERY and (self._moving or np.abs(q - self._q).max() > MOVED):
+        elif since >= _EVERY and (self._moving or np.abs(q - self._q).max() > _MOVED):
             speed = (q - self._q) / since
-            self._moving = bool(np.abs(q - self._q).max() > MOVED)
+            self._moving = bool(np.abs(q - self._q).max() > _MOVED)
         else:
             return self._expected
         self._time, self._q = t, np.array(q)
-        now = LEAD[-1:]
+        now = _LEAD[-1:]
         pull = None if wrench is None else wrench[None]
         warm = None if temperature is None else np.array([temperature])
         recording = Recording(
             'live',
-            JointMotion(LEAD, q + LEAD[:, None] * speed, np.tile(speed, (LEAD.size, 1))),
+            JointMotion(_LEAD, q + _LEAD[:, None] * speed, np.tile(speed, (_LEAD.size, 1))),
             None,
             None if pull is None else Signal(now, pull),
             wrench_frame,

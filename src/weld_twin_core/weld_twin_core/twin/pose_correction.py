@@ -27,7 +27,7 @@ from .posterior import pose_covariances
 from .program_correction import SINGULAR, too_large
 from .program_model import ProgramModel
 
-ROUNDS = 12
+_ROUNDS = 12
 """Newton rounds; with the real arm's own slope every one squares what is left."""
 _SIDE = 1e-4
 """Step [rad or m] of a joint to either side over which slopes are taken: what bends there is below
@@ -114,7 +114,7 @@ class PoseCorrection:
         DataError: it cannot be reached from there.
         """
         q, size = near, np.inf
-        for _ in range(ROUNDS):
+        for _ in range(_ROUNDS):
             beside = q + self._sides
             real = self._real_poses(beside)
             error, rise = between(real[0], pose), _rise(real)

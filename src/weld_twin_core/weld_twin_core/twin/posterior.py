@@ -37,20 +37,20 @@ from .poses import Poses
 from .reversals import just_turned
 from .twin import Twin
 
-DRAWS = 400
+_DRAWS = 400
 """Models drawn: enough for the 5th and 95th of a hundred to be steady within a few per cent."""
-PLACES = 300
+_PLACES = 300
 """Places of a motion at which models are drawn; between them what a model is off by hardly changes."""
-ALIKE = 1.0
+_ALIKE = 1.0
 """Postures so near [rad or m] err alike in what no parameter explains. A judgement: on seven sealed
 cells it held as many paths as one shift all along, with intervals a fifth narrower; 0.3 held fewer."""
-WAVES = 256
+_WAVES = 256
 """Functions of posture that it is drawn from."""
-SEED = 0
+_SEED = 0
 """Of the draws: every promise is made of the same models."""
-CHUNK = 2000
+_CHUNK = 2000
 """Samples at once; a hundred coordinates of so many poses take some ten megabytes."""
-SETTLED = 1e-13
+_SETTLED = 1e-13
 """Share of the largest variance, coordinates at unit size, below which a direction is certain."""
 
 
@@ -111,7 +111,7 @@ class Posterior:
         most = max(float(values.max(initial=0.0)), 1e-300)
         if values.min(initial=0.0) < -1e-6 * most:
             raise DataError('the posterior covariance has a negative variance')
-        live = values > SETTLED * most
+        live = values > _SETTLED * most
         return np.asarray(size[:, None] * vectors[:, live] * np.sqrt(values[live]))
 
     def pose_covariance(self, features: Features, setup: int = 0) -> Array:
@@ -259,7 +259,7 @@ class Posterior:
             self, mean=np.zeros_like(self.mean), covariance=0.5 * (remaining + remaining.T)
         )
 
-    def drawn(self, features: Features, setup: int = 0, count: int = DRAWS) -> Array:
+    def drawn(self, features: Features, setup: int = 0, count: int = _DRAWS) -> Array:
         """
         Return by how much the true position is off the twin's, shape (M, 2, count, 3) [m].
 
@@ -270,7 +270,7 @@ class Posterior:
 
         Raises ModelError: there is no such base frame.
         """
-        rng = np.random.default_rng(SEED)
+        rng = np.random.default_rng(_SEED)
         unit, ways = rng.standard_normal, self.factor.shape[1]
         # Every way by itself is as a normal law has it (Latin hypercube): draws are steadier so.
         ranks = rng.permuted(np.tile(np.arange(count), (ways, 1)), axis=1).T
@@ -342,9 +342,9 @@ def _spread(moved: Array, rest: Array, grown: Array) -> Array:
 
 def _bends(q: Array) -> Array:
     """
-    Return functions of posture, shape (M, `WAVES`), whose sums with normal weights have unit variance.
+    Return functions of posture, shape (M, `_WAVES`), whose sums with normal weights have unit variance.
 
-    Alike within `ALIKE` and unlike beyond [1]_: what no parameter explains is not one shift all along a
+    Alike within `_ALIKE` and unlike beyond [1]_: what no parameter explains is not one shift all along a
     path, or how far the tool strays at its worst would be no more than how far it strays.
 
     References
@@ -352,10 +352,10 @@ def _bends(q: Array) -> Array:
     .. [1] A. Rahimi, B. Recht, "Random features for large-scale kernel machines", NIPS 2007.
 
     """
-    rng = np.random.default_rng(SEED)
-    slopes = rng.standard_normal((q.shape[1], WAVES)) / ALIKE
-    phase = rng.uniform(0.0, 2.0 * np.pi, WAVES)
-    return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(q @ slopes + phase))
+    rng = np.random.default_rng(_SEED)
+    slopes = rng.standard_normal((q.shape[1], _WAVES)) / _ALIKE
+    phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    return np.asarray(np.sqrt(2.0 / _WAVES) * np.cos(q @ slopes + phase))
 
 
 def _misplace(moved: Array, jumped: Array, recorded: float, rng: np.random.Generator) -> None:
@@ -390,7 +390,7 @@ class Drawn(NamedTuple):
 
 def places(count: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Return the samples at which models are drawn, shape (K,), and `Drawn.near`, shape (count,)."""
-    at = np.unique(np.linspace(0, count - 1, min(PLACES, count)).round().astype(int))
+    at = np.unique(np.linspace(0, count - 1, min(_PLACES, count)).round().astype(int))
     middles = 0.5 * (at[1:] + at[:-1])
     return at, np.searchsorted(middles, np.arange(count))
 
@@ -420,8 +420,8 @@ def expected_poses(
 
 
 def _pieces(at: Array) -> Iterator[Array]:
-    for start in range(0, at.size, CHUNK):
-        yield at[start : start + CHUNK]
+    for start in range(0, at.size, _CHUNK):
+        yield at[start : start + _CHUNK]
 
 
 def usual_sigma(posterior: Posterior, twin: Twin, q: Array) -> float:

@@ -33,7 +33,7 @@ from ..recording import JointMotion
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
 
-ROUNDS = 5
+_ROUNDS = 5
 """Rounds of moving points; effects are small, each takes away all but some thousandths."""
 SINGULAR = 1e-9
 """Damping of a joint step [m^2]: invisible but within micrometres of a singularity."""
@@ -174,7 +174,7 @@ class _Work(NamedTuple):
     def solved(self, still: set[int], calm: Collection[int]) -> MoveProgram:
         """Return the program with every point moved but those that stay."""
         moved = self.program
-        for _ in range(ROUNDS):
+        for _ in range(_ROUNDS):
             steps: dict[int, list[Array]] = {}
             for piece in self.travel.pieces:
                 try:

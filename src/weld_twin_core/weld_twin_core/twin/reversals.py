@@ -27,7 +27,7 @@ from .twin import Twin
 
 _CAME_FROM = 0.02
 """How far a joint is taken to have come [rad or m] where the direction is known: more than any play."""
-ROUNDS = 16
+_ROUNDS = 16
 """Each takes what is added into account for the motion that plays see. A gap is then crossed within one
 part in so many of its width, which is within the narrowest standstill that a step is spread over."""
 _STEP = 1e-7
@@ -83,7 +83,7 @@ def play_steps(
     """Return what takes play away, as steps (K, n) [rad or m], of the motion wanted behind the gaps."""
     motion = recording.joints
     steps = np.zeros_like(motion.q)
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         moved = JointMotion(motion.t, motion.q + steps, motion.qd)
         before = approached(replace(recording, joints=moved), came)
         steps = -lost_motion(robot, plays, before)[-motion.t.size :]

@@ -32,7 +32,7 @@ _BLOCK = 1504
 
 _POSE = 12
 """Rows that make up the pose of a piece; in the far piece those of its screws come before."""
-LENGTHS = 4
+_LENGTHS = 4
 """Lengths of blocks whose working memory a kernel keeps."""
 
 
@@ -132,7 +132,7 @@ class BulkKernel:
         """Write poses; if wanted, leave screws in memory and, of near ones, moment and axis in place."""
         n = len(q)
         if n not in self._memory:
-            if len(self._memory) == LENGTHS:
+            if len(self._memory) == _LENGTHS:
                 self._memory.pop(next(k for k in self._memory if k != _BLOCK))
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]

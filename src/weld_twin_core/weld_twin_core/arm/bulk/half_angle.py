@@ -23,7 +23,7 @@ import numpy as np
 from ...arrays import Array
 from .buffers import aligned
 
-SINE = (
+_SINE = (
     3.141592653589793,
     -5.167712780049969,
     2.5501640398773007,
@@ -35,7 +35,7 @@ SINE = (
     7.697847275590284e-07,
 )
 """Coefficients of sin(pi x) / x in powers of x^2."""
-COSINE = (
+_COSINE = (
     1.0,
     -4.934802200544676,
     4.058712126416498,
@@ -47,9 +47,9 @@ COSINE = (
     4.149578027057121e-06,
 )
 """Coefficients of cos(pi x) in powers of x^2."""
-DEGREE = len(COSINE) - 1
+DEGREE = len(_COSINE) - 1
 """Of the polynomials, in the square of the angle."""
-_POLYNOMIALS = np.array([COSINE, SINE])
+_POLYNOMIALS = np.array([_COSINE, _SINE])
 
 
 def _tangent_is_vectorised() -> bool:

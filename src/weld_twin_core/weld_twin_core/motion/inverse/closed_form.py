@@ -83,11 +83,11 @@ def _spherical(arm: _Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, elbow and wrist, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
-    q1 = -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
+    q1 = -_angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
     # Minus: it is the arm that turns back onto the point.
     reach = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
     length = np.linalg.norm(reach, axis=-1)
-    q3 = _two_ways(angle_to_distance(p[2] - p[1], h[2], centre - p[2], length), 1)
+    q3 = _two_ways(_angle_to_distance(p[2] - p[1], h[2], centre - p[2], length), 1)
     bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], (*q3.shape, 3)))
     q2 = _angle_onto(h[1], bent, reach[:, None])
     shoulder = _turn_matrix(h[0], q1)[:, None]
@@ -111,7 +111,7 @@ def _listed(*angles: Array) -> Array:
 def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Array, Array]:
     """Return both (q4, q5, q6), each (2, 2, 2, N), of wrists' rotations (2, 2, N, 3, 3)."""
     last = rotation @ h6
-    q5 = _two_ways(angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
+    q5 = _two_ways(_angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
     q4 = _angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
     before = _turn_matrix(h4, q4) @ _turn_matrix(h5, q5)
     return q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation[:, :, None])
@@ -121,11 +121,11 @@ def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, wrist and elbow, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
-    q1 = -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
+    q1 = -_angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
     turned = _turn_matrix(h[0], -q1) @ rotation
     last = turned @ h[5]
     straight = np.broadcast_to(h[5], last.shape)
-    q5 = _two_ways(angle_to_height(h[1], h[4], straight, last @ h[1]), 1)
+    q5 = _two_ways(_angle_to_height(h[1], h[4], straight, last @ h[1]), 1)
     turned = turned[:, None]
     # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
     seen = turn(h[4], -q5, np.broadcast_to(h[1], (*q5.shape, 3)))
@@ -141,7 +141,7 @@ def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
 def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Array]:
     """Return both (q2, q3, q4), each (2, 2, 2, N), of axis 4's foot from axis 2 and total turn."""
     h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
-    q3 = _two_ways(angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
+    q3 = _two_ways(_angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
     bent = upper + turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
     q2 = _angle_onto(h[1], bent, foot[:, :, None])
     signs = h[1] @ h[2], h[1] @ h[3]
@@ -199,7 +199,7 @@ def _angle_onto(axis: Array, start: Array, end: Array) -> Array:
     return np.asarray(np.arctan2(sine, cosine))
 
 
-def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
+def _angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
     """Return both angles (2, ...) [rad] at which a turned vector has a component along another."""
     level = (start @ axis)[..., None] * axis
     cosine = ((start - level) * along).sum(axis=-1)
@@ -211,10 +211,10 @@ def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> A
     return np.stack([middle + spread, middle - spread])
 
 
-def angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array) -> Array:
+def _angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array) -> Array:
     """Return both angles at which ``offset`` plus the turned vector has a length, (2, ...)."""
     height = 0.5 * (distance**2 - (offset**2).sum(axis=-1) - (start**2).sum(axis=-1))
-    return angle_to_height(offset, axis, start, height)
+    return _angle_to_height(offset, axis, start, height)
 
 
 def _cross(first: Array, second: Array) -> Array:

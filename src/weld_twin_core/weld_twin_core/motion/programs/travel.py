@@ -39,7 +39,7 @@ _REST = 0.3
 """Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
 _NEAR = 0.15
 """A linear move that would begin farther [rad or m] from the posture so far has to change it."""
-CLOSED = 1e-7
+_CLOSED = 1e-7
 """Gap [m, rad] up to which a pose counts as reached; programs write micrometres."""
 _STANDS = (
     'the positioner moves while the tool goes straight in a frame that stands still; what way it '
@@ -149,9 +149,9 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
         )
     external = course.program.external_at(move.end)
     turned = np.abs(external - q[: external.size])[: arm.behind].max(initial=0.0)
-    if turned > CLOSED and not move.along:
+    if turned > _CLOSED and not move.along:
         raise PathError(_STANDS)
-    poses, via = tool_way(arm, course.program, move, forward(arm, q))
+    poses, via = _tool_way(arm, course.program, move, forward(arm, q))
     share = np.linspace(0.0, 1.0, len(poses))[:, None]
     place = course.program.place(move.end)
     way = _on_the_way(
@@ -184,7 +184,7 @@ def _on_the_way(
     for start in starts:
         near, error = chain.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
-        if np.abs(error).max() < CLOSED and steps < _NEAR:
+        if np.abs(error).max() < _CLOSED and steps < _NEAR:
             return near
     result = chain.whole(external, chain.solve_path(poses, external, q).q)
     if np.abs(result[0] - q).max() > _NEAR:
@@ -251,7 +251,7 @@ def _turned(chain: CarriedArm, result: Array) -> Array:
     return np.concatenate(last)
 
 
-def tool_way(
+def _tool_way(
     arm: Robot, program: MoveProgram, move: Move, begin: Array, count: int = 0, at: int = 0
 ) -> tuple[Array, int]:
     """
@@ -349,7 +349,7 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
             part = _joint_part(chain, program, move, q, first, way)
         else:
             at = max(int(piece.vias[k]) - first, 0)
-            poses, _ = tool_way(arm, program, move, forward(arm, q[first]), way, at)
+            poses, _ = _tool_way(arm, program, move, forward(arm, q[first]), way, at)
             part = _closed(chain, piece.motion.q[first : first + way], poses, move)
         q[first : first + way] = part
         q[first + way : last + 1] = part[-1]
@@ -421,6 +421,6 @@ def _joint_part(
 
 def _closed(chain: CarriedArm, q: Array, poses: Array, move: Move) -> Array:
     result, error = chain.polish(q, poses)
-    if np.abs(error).max() > CLOSED:
+    if np.abs(error).max() > _CLOSED:
         raise ReachError(f'{move.where}: out of reach, or at a singularity')
     return result

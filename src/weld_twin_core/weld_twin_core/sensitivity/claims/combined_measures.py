@@ -65,7 +65,7 @@ def _coupling(case: Case, draws: Array, combined: Array) -> dict[str, float]:
     return {'coupling': float((remaining / combined[:20].max(axis=1)).max())}
 
 
-def drift(case: Case) -> dict[str, float]:
+def _drift(case: Case) -> dict[str, float]:
     """Measure how the cumulative deviation grows with the path, by source and together."""
     study = case.smooth
     # Equal steps of arc length: on a time law the sum would follow the speed, not the path.
@@ -130,4 +130,4 @@ def _per_unit(case: Case) -> dict[str, float]:
     return {f'unit_{label}': value for label, value in best.items()}
 
 
-MEASURES: tuple[Measure, ...] = (_sums, drift, _ranking)
+MEASURES: tuple[Measure, ...] = (_sums, _drift, _ranking)

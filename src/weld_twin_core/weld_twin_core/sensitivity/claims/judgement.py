@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from ...errors import DataError
 from .rules import RULES, Measured, Range, Rule
 
-HOLDS, HOLDS_WHEN, DOES_NOT = 'holds', 'holds when', 'does not hold'
+_HOLDS, _HOLDS_WHEN, _DOES_NOT = 'holds', 'holds when', 'does not hold'
 
 
 class CaseName(NamedTuple):
@@ -54,11 +54,11 @@ def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
 def _decide(rule: Rule, cases: Sequence[Measured]) -> Claim:
     ranges = {key: Range([case[key] for case in cases]) for key in cases[0]}
     held = sum(bool(rule.holds(case)) for case in cases)
-    verdict = DOES_NOT
+    verdict = _DOES_NOT
     if held == len(cases):
-        verdict = HOLDS
+        verdict = _HOLDS
     elif rule.holds_then is not None and all(rule.holds_then(case) for case in cases):
-        verdict = f'{HOLDS_WHEN} {rule.condition}'
+        verdict = f'{_HOLDS_WHEN} {rule.condition}'
     measured = {key: (ranges[key].low, ranges[key].high) for key in rule.shows}
     told = rule.key, rule.statement, rule.where, verdict, rule.reason(ranges)
     return Claim(*told, held, len(cases), measured)

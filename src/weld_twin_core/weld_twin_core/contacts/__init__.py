@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contacts as a measurement: a ball in a socket, a pin, a bar, a plane, each somewhere unknown."""
 
-from .artefact import Artefact
-from .contact import KINDS, Contact, Tie
-from .contacts import Contacts
+from .artefact import KINDS, Artefact, Contact, Contacts, Tie
 from .places import Length, Places, lengths, places, spreads
 from .unknowns import Unknowns, unknowns
 

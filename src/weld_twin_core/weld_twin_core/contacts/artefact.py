@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is touched: sockets, pins, bars and faces, and the lengths and angles between them."""
+"""What is touched, sockets, pins, bars and faces, what is known between them, and by which posture."""
 
 from __future__ import annotations
 
@@ -10,10 +10,85 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.rotation import rotation_matrix
+from ..arrays import Array, readonly
 from ..errors import DataError
-from .contact import LOOSE, Contact, Tie
+
+KINDS = ('point', 'length', 'sphere', 'line', 'plane')
+"""What a contact can be; how each is seen is in `surfaces`."""
+_LOOSE = 1e-4
+"""Uncertainty [m, rad] of a length or angle without one, as of a calliper or a straight edge."""
+_FACE = 0.1
+"""Length [m] over which the uncertainty of a known place turns a face or an edge: that of a block."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One thing that the tool point touches; DataError for no such kind, or half a place."""
+
+    label: str
+    kind: str = 'point'
+    """'point', 'length' (distance from a centre), 'sphere', 'line' or 'plane'."""
+    radius: float | None = None
+    """Of a sphere, from its centre to the tool point [m]; unknown when left out."""
+    at: tuple[float, float, float] | None = None
+    """Where it is, in the frame that the base stands in: the point, the centre, or a point of the
+    face or the edge [m]. Not known when left out."""
+    axis: tuple[float, float, float] | None = None
+    """Normal of a plane or direction of a line that is known."""
+    sigma: float = _LOOSE
+    """Uncertainty of a known place [m]."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise DataError(
+                f'contact {self.label!r} is of kind {self.kind!r}; a kind is one of '
+                + ', '.join(KINDS)
+            )
+        turned = self.kind in ('plane', 'line')
+        if (self.axis is not None) != (turned and self.at is not None):
+            need = 'at and axis' if turned else 'at alone'
+            raise DataError(f'contact {self.label!r}: a {self.kind} that is known has {need}')
+        if self.axis is not None and not np.linalg.norm(self.axis) > 0.0:
+            raise DataError(f'contact {self.label!r}: its axis has no direction')
+        if not self.sigma > 0.0:
+            raise DataError(f'contact {self.label!r}: sigma must be a positive number [m]')
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return what an artefact file says of it."""
+        out: dict[str, Any] = {'kind': self.kind}
+        if self.radius is not None:
+            out['radius'] = self.radius
+        if self.at is not None:
+            out |= {'at': list(self.at), 'sigma': self.sigma}
+        if self.axis is not None:
+            out['axis'] = list(self.axis)
+        return out
+
+    @property
+    def known(self) -> bool:
+        """Return whether its place is known."""
+        return self.at is not None
+
+    @property
+    def sigma_turn(self) -> float:
+        """Return the uncertainty [rad] of a known axis."""
+        return self.sigma / _FACE
+
+
+@dataclass(frozen=True)
+class Tie:
+    """What is known between two contacts."""
+
+    between: tuple[str, str]
+    """Two labels."""
+    value: float
+    sigma: float = _LOOSE
+    """Distance [m] of points, centres or parallel planes, or angle of planes [rad]; its uncertainty."""
+    kind: str = 'distance'
+    """'distance' or 'angle'."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +237,7 @@ def _contact(label: str, what: object) -> Contact:
         radius,
         _three(entry.get('at'), f'at of contact {label!r}'),
         _three(entry.get('axis'), f'the axis of contact {label!r}'),
-        _number(entry.get('sigma', LOOSE), f'sigma of contact {label!r}'),
+        _number(entry.get('sigma', _LOOSE), f'sigma of contact {label!r}'),
     )
 
 
@@ -173,7 +248,7 @@ def _block(label: str, what: object) -> tuple[list[Contact], list[Tie]]:
     size = _three(what.get('size'), f'the size of block {label!r}')
     if size is None or min(size) <= 0.0:
         raise DataError(f'block {label!r} needs size: [X, Y, Z], three positive lengths [m]')
-    sigma = _number(what.get('sigma', LOOSE), f'sigma of block {label!r}')
+    sigma = _number(what.get('sigma', _LOOSE), f'sigma of block {label!r}')
     square = _number(what.get('square', _SQUARE), f'square of block {label!r}')
     at = _three(what.get('at'), f'at of block {label!r}')
     turn = _three(what.get('turn', [0.0, 0.0, 0.0]), f'the turn of block {label!r}')
@@ -226,7 +301,7 @@ def _tie(item: object, kind: str, name: str) -> Tie:
     between = item.get('between')
     if isinstance(between, str) or not isinstance(between, Sequence) or len(between) != 2:
         raise DataError(f'an entry of {name} needs between: [LABEL, LABEL]')
-    sigma = _number(item.get('sigma', LOOSE), f'a sigma in {name}')
+    sigma = _number(item.get('sigma', _LOOSE), f'a sigma in {name}')
     value = _number(item.get('value'), f'a value in {name}')
     return Tie((str(between[0]), str(between[1])), value, sigma, kind)
 
@@ -235,3 +310,65 @@ def _number(value: object, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise DataError(f'{what} must be a number, got {value!r}')
     return float(value)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts of the tool point, one for every posture; DataError for one that is not known."""
+
+    artefact: Artefact
+    labels: tuple[str, ...]
+    """What each posture touched."""
+    value: Array | None = None
+    """Measured distance from the centre, of contacts of kind 'length', shape (M,) [m]."""
+    sigma: Array | None = None
+    """Standard deviation of each contact, where known, shape (M,) [m]."""
+
+    def __post_init__(self) -> None:
+        for label in dict.fromkeys(self.labels):
+            self.artefact.named(label)
+        count = (len(self.labels),)
+        for name in ('value', 'sigma'):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, readonly(given, count, f'{name} of the contacts'))
+        if self.sigma is not None and not (self.sigma > 0.0).all():
+            raise DataError('sigma of the contacts must be positive [m]')
+        lengths = [self.artefact.named(label).kind == 'length' for label in self.labels]
+        if any(lengths) and (self.value is None or (self.value[lengths] <= 0.0).any()):
+            raise DataError(
+                'a contact of kind length needs the measured distance in the column value [m]'
+            )
+
+    @property
+    def size(self) -> int:
+        """Return the number of postures."""
+        return len(self.labels)
+
+    def of(self, label: str) -> NDArray[np.intp]:
+        """Return the postures that touched one contact."""
+        return np.flatnonzero(np.array(self.labels) == label)
+
+    def take(self, index: NDArray[np.intp]) -> Contacts:
+        """Return some of the postures, and of the artefact what they touched."""
+        labels = tuple(self.labels[k] for k in index)
+        return Contacts(
+            self.artefact.part(labels),
+            labels,
+            None if self.value is None else self.value[index],
+            None if self.sigma is None else self.sigma[index],
+        )
+
+    def parts(self) -> list[NDArray[np.intp]]:
+        """Return the postures of every place: contacts that hang together, one kind each."""
+        groups = self.artefact.part(self.labels).groups()
+        return [np.flatnonzero(np.isin(self.labels, group)) for group in groups]
+
+    @property
+    def rows(self) -> int:
+        """Return the scalar rows of a posture: 3 for points, 2 for a line, 1 for the others."""
+        return max(_ROWS[self.artefact.named(label).kind] for label in set(self.labels))
+
+
+_ROWS = {'point': 3, 'line': 2, 'length': 1, 'sphere': 1, 'plane': 1}
+"""Scalar rows that one posture gives."""

@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from .artefact import Artefact
-from .contact import Tie
-from .contacts import Contacts
+from .artefact import Artefact, Contacts, Tie
 from .surfaces import Surface
 
 _ROUNDS = 8
@@ -194,13 +192,8 @@ def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
 
 def lengths(contacts: Contacts, points: Array) -> list[Length]:
     """Return what tool points, shape (M, 3) [m], make of the known distances and angles."""
-    out = []
-    artefact = contacts.artefact
-    for tie in artefact.ties:
-        if not set(tie.between) <= set(contacts.labels):
-            continue
-        out.append(Length(tie, _measured(tie, contacts, points)))
-    return out
+    ties = [t for t in contacts.artefact.ties if set(t.between) <= set(contacts.labels)]
+    return [Length(tie, _measured(tie, contacts, points)) for tie in ties]
 
 
 def _measured(tie: Tie, contacts: Contacts, points: Array) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from .contact import Contact
+from .artefact import Contact
 
 _LEAST = 1e-9
 """Length [m] that counts as none; keeps a direction from a division by zero."""

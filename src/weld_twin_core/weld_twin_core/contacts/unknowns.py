@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-from .contacts import Contacts
+from .artefact import Contacts
 from .places import places
 
 _RANK = 1e-9

@@ -21,9 +21,6 @@ from .wording import turn
 
 
 class _Search(SearchHooks):
-    effect: AxisCompliance
-    kind: type[AxisCompliance]
-
     def fits(self, robot: Robot, joint: str | None) -> bool:
         at = -1 if joint is None else robot.index(joint)
         return at > robot.behind and not bool(robot.prismatic[at])

@@ -56,19 +56,11 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
 
 def spreads(robot: Robot, effect: Effect) -> Array:
     """Return the prior standard deviation of every fit coordinate, shape (K,)."""
-    if isinstance(effect, TransmissionRipple):
-        each = plausible(robot, effect.name, 'amplitude', effect.site)
-        # Sine and cosine share the amplitude.
-        return np.full(effect.fit.coordinates().size, each.sd / np.sqrt(2.0))
     return np.array([each.sd for each in _each(robot, effect)])
 
 
 def ranges(robot: Robot, effect: Effect) -> tuple[Array, Array]:
     """Return the least and the most of every fit coordinate, each shape (K,)."""
-    if isinstance(effect, TransmissionRipple):
-        most = plausible(robot, effect.name, 'amplitude', effect.site).high
-        full = np.full(effect.fit.coordinates().size, most)
-        return -full, full
     result = _each(robot, effect)
     return np.array([each.low for each in result]), np.array([each.high for each in result])
 
@@ -85,6 +77,11 @@ def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
 
 
 def _each(robot: Robot, effect: Effect) -> list[Plausible]:
+    """Return what every fit coordinate may be."""
+    if isinstance(effect, TransmissionRipple):  # sine and cosine share the amplitude
+        wave = plausible(robot, effect.name, 'amplitude', effect.site)
+        one = replace(wave, sd=wave.sd / np.sqrt(2.0), low=-wave.high)
+        return [one] * effect.fit.coordinates().size
     specs = effect.components()
     return [
         plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fit.fitted()

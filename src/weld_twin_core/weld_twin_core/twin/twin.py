@@ -89,11 +89,11 @@ class Twin(EffectStages):
             motion = recording.joints
             poses = forward(self.robot, motion.q if at is None else motion.at(at)[0])
             return Poses(poses[..., :3, 3], poses[..., :3, :3])
-        return self._full(self._evaluate(recording, at, False))
+        return self._full(self.evaluate(recording, at))
 
     def joints(self, recording: Recording, at: Array | None = None) -> Array:
         """Return the joint positions behind `poses`, shape (..., M, n) [rad or m]."""
-        view = self._evaluate(recording, at, False).view
+        view = self.evaluate(recording, at).view
         parts = [
             np.asarray(view.q[..., i] + view.shift.get(('q', i), 0.0)) for i in range(self.robot.n)
         ]
@@ -128,7 +128,7 @@ class Twin(EffectStages):
             Columns as in `components`.
 
         """
-        run = self._evaluate(recording, at, True)
+        run = self.evaluate(recording, at, want=True)
         poses = self._full(run)
         columns = self.columns(run)
         out = np.empty((6, len(run.tangents), *poses.position.shape[:-1]))
@@ -182,9 +182,12 @@ class Twin(EffectStages):
 
     # Evaluation ------------------------------------------------------------------------------
 
-    def evaluate(self, recording: Recording, at: Array | None = None) -> Evaluation:
-        """Return one pass through the stages, without derivatives."""
-        return self._evaluate(recording, at, False)
+    def evaluate(
+        self, recording: Recording, at: Array | None = None, *, want: bool = False
+    ) -> Evaluation:
+        """Return one pass through the stages, with derivatives if wanted."""
+        view, tangents = self._sampled(recording, at, want)
+        return self.pointwise(view, tangents if want else None)
 
     def joint_view(self, recording: Recording) -> View:
         """Return what effects with memory see: the commanded motion on its own stamps."""
@@ -200,10 +203,6 @@ class Twin(EffectStages):
         motion, (wrench, temperature, effort) = recording.joints, sides
         seen = self.robot, t, t - motion.t[0], q, qd, motion.static, wrench
         return View(*seen, recording.wrench_frame, temperature, effort, recording.effort_holds)
-
-    def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
-        view, tangents = self._sampled(recording, at, want)
-        return self.pointwise(view, tangents if want else None)
 
     def _sampled(
         self, recording: Recording, at: Array | None, want: bool

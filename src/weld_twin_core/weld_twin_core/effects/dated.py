@@ -28,7 +28,7 @@ from .wording import base_frame, frame, radians
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
 
-_T = TypeVar('T', bound='_Timed')
+_T = TypeVar('_T', bound='_Timed')
 
 
 class _Timed(LinearEffect):

@@ -43,7 +43,7 @@ else:  # what tools see; at run time `register` makes the dataclass
         return lambda function: function
 
 
-_E = TypeVar('E', bound='Effect')
+_E = TypeVar('_E', bound='Effect')
 
 
 @dataclass(frozen=True, eq=False)

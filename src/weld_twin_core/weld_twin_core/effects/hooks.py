@@ -98,7 +98,7 @@ class _Hooks:
         self.kind, self.effect = kind, effect
 
 
-_G = TypeVar('G', bound=_Hooks, covariant=True)
+_G = TypeVar('_G', bound=_Hooks, covariant=True)
 
 
 class Hooked(Generic[_G]):

@@ -15,7 +15,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .view import Parameter
 
-_P = TypeVar('P', bound='Parametric')
+_P = TypeVar('_P', bound='Parametric')
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from weld_twin_core.sensitivity import (
     tolerances_from_list,
 )
 from weld_twin_core.sensitivity.memory_draws import remembered
-from weld_twin_core.sensitivity.outcome import outcomes
+from weld_twin_core.sensitivity.seam_study import outcomes
 
 
 @pytest.fixture(scope='module')

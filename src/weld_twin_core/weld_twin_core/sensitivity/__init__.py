@@ -23,8 +23,16 @@ from .distribution import Distribution
 from .evaluate import Model, draws_at, exact_deviations, model
 from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
 from .morris import MorrisDesign, Screening, morris_screening
-from .outcome import Outcomes, outcomes
-from .seam_study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
+from .seam_study import (
+    POINTS,
+    Outcomes,
+    Study,
+    outcomes,
+    planned_study,
+    recorded_study,
+    study_of_plan,
+    with_known,
+)
 from .sobol import SobolDesign, SobolIndices, sobol_indices
 from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
 from .sweep import (

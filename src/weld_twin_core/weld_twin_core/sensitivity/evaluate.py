@@ -19,8 +19,7 @@ from ..errors import ModelError
 from ..twin.twin import Twin
 from .determining_samples import determining
 from .expansion import CHUNK, Expansion, expand, expandable
-from .outcome import Outcomes, joined, outcomes
-from .seam_study import Study
+from .seam_study import Outcomes, Study, joined, outcomes
 from .tolerance import Tolerance, with_draws
 
 _CHECKED = 32

@@ -24,8 +24,7 @@ from ..arrays import Array
 from ..effects import REGISTRY, Stage
 from ..twin.twin import Twin
 from .memory_draws import MEMORY, Remembered, Rest, remembered
-from .outcome import Outcomes, joined, outcomes
-from .seam_study import Study
+from .seam_study import Outcomes, Study, joined, outcomes
 from .tolerance import Tolerance, with_draws
 
 CHUNK = 30_000

@@ -26,7 +26,7 @@ from scipy.special import ndtri
 from ..arrays import Array
 from ..errors import DataError
 from .evaluate import Function
-from .outcome import refuse_unfinite
+from .seam_study import refuse_unfinite
 
 _LEVELS = 8
 """Levels of the grid of each input; even, as the method wants, so that all are visited alike."""

@@ -28,7 +28,7 @@ from scipy.special import ndtri
 from ..arrays import Array
 from ..errors import DataError
 from .evaluate import Function
-from .outcome import refuse_unfinite
+from .seam_study import refuse_unfinite
 
 _CONFIDENCE = 0.95
 """Of the intervals of the indices."""

@@ -13,7 +13,7 @@ from scipy.special import bdtr, bdtrik, betaincinv
 
 from ..arrays import Array
 from ..errors import DataError
-from .outcome import Outcomes, refuse_unfinite
+from .seam_study import Outcomes, refuse_unfinite
 
 _PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
 """Percentiles by which the distribution is reported [%]."""

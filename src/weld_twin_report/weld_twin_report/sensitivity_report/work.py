@@ -26,7 +26,7 @@ from weld_twin_core.sensitivity import (
     Tolerance,
     ToleranceStack,
 )
-from weld_twin_core.sensitivity.outcome import joined
+from weld_twin_core.sensitivity.seam_study import joined
 from weld_twin_nodes.offline.content_hash import digest
 from weld_twin_nodes.offline.task_pool import Runner, Task
 

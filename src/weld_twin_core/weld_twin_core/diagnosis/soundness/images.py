@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Array
 from ...bundle import adjusted
 from ...cameras import Sightings
-from ...cameras.located import located
+from ...cameras.bodies import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
 from ..algebra.definite import outside, span_of

@@ -7,8 +7,8 @@ from ...motion.paths import Path
 from .claim_case import Case
 from .combined_measures import MEASURES as COMBINED
 from .geometric_measures import MEASURES as GEOMETRIC
-from .judgement import CaseName, Claim, judge
 from .motion_measures import MEASURES as MOTION
+from .rules import CaseName, Claim, judge
 
 __all__ = ['Case', 'CaseName', 'Claim', 'judge', 'measure_case']
 

@@ -1,18 +1,21 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every claim of the paper, and the measurement that decides it."""
+"""Every claim of the paper, the measurement that decides it, and the verdict by many cases."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
-Measured = Mapping[str, float]
+from ...errors import DataError
+
+_Measured = Mapping[str, float]
 
 
-class Range:
+class _Range:
     """What a measurement was over all cases; formats as its least and largest value."""
 
     def __init__(self, values: Sequence[float]) -> None:
@@ -24,8 +27,8 @@ class Range:
         low, high = format(self.low, kind), format(self.high, kind)
         return low if low == high else f'{low} to {high}'
 
-    def __mul__(self, factor: float) -> Range:
-        return Range([self.low * factor, self.high * factor])
+    def __mul__(self, factor: float) -> _Range:
+        return _Range([self.low * factor, self.high * factor])
 
 
 @dataclass(frozen=True)
@@ -36,15 +39,15 @@ class Rule:
     statement: str
     where: str
     """Name, what the paper says, and in which section."""
-    holds: Callable[[Measured], bool]
+    holds: Callable[[_Measured], bool]
     """Whether the claim as written holds on one case."""
-    reason: Callable[[Mapping[str, Range]], str]
+    reason: Callable[[Mapping[str, _Range]], str]
     """One line made of the ranges of the measurements."""
     shows: tuple[str, ...]
     """Measurements the table gives."""
     condition: str = ''
     """Under which condition the claim holds where it does not hold as written."""
-    holds_then: Callable[[Measured], bool] | None = None
+    holds_then: Callable[[_Measured], bool] | None = None
     """Whether it holds on one case under that condition."""
 
 
@@ -53,7 +56,7 @@ _DEGREE_IN_MM = 1e3 * np.pi / 180.0
 _SAME = 1e-3
 """Ratios closer to one than this are the same."""
 
-RULES: tuple[Rule, ...] = (
+_RULES: tuple[Rule, ...] = (
     Rule(
         'baseline',
         'Without errors D_norm is about 0, at the limit of the arithmetic',
@@ -364,3 +367,55 @@ RULES: tuple[Rule, ...] = (
         ),
     ),
 )
+
+_HOLDS, _HOLDS_WHEN, _DOES_NOT = 'holds', 'holds when', 'does not hold'
+
+
+class CaseName(NamedTuple):
+    """Which robot on which seam."""
+
+    robot: str
+    seam: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim with its verdict."""
+
+    key: str
+    statement: str
+    where: str
+    verdict: str
+    """'holds', 'holds when ...' with the condition, or 'does not hold'."""
+    reason: str
+    held: int
+    """On how many of the cases the claim holds as written."""
+    cases: int
+    measured: dict[str, tuple[float, float]]
+    """Least and largest value of every measurement behind it."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and strings."""
+        measured = {key: {'least': a, 'largest': b} for key, (a, b) in self.measured.items()}
+        told = asdict(self)
+        return {'claim': told.pop('key'), **told, 'measured': measured}
+
+
+def judge(cases: Mapping[CaseName, _Measured]) -> tuple[Claim, ...]:
+    """Return a verdict on every claim by the measurements of all cases; DataError for none."""
+    if not cases:
+        raise DataError('the claims need at least one robot on one seam')
+    return tuple(_decide(rule, list(cases.values())) for rule in _RULES)
+
+
+def _decide(rule: Rule, cases: Sequence[_Measured]) -> Claim:
+    ranges = {key: _Range([case[key] for case in cases]) for key in cases[0]}
+    held = sum(bool(rule.holds(case)) for case in cases)
+    verdict = _DOES_NOT
+    if held == len(cases):
+        verdict = _HOLDS
+    elif rule.holds_then is not None and all(rule.holds_then(case) for case in cases):
+        verdict = f'{_HOLDS_WHEN} {rule.condition}'
+    measured = {key: (ranges[key].low, ranges[key].high) for key in rule.shows}
+    told = rule.key, rule.statement, rule.where, verdict, rule.reason(ranges)
+    return Claim(*told, held, len(cases), measured)

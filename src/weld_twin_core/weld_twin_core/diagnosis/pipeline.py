@@ -35,7 +35,7 @@ from .result import Diagnosis, Shrink, Structure
 from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
-from .soundness.richness import refuse_reused
+from .soundness.richness import refuse_reused, with_temperatures
 from .unseen.held_out_shrink import held_out_shrink, left_on
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
@@ -130,7 +130,7 @@ def diagnose(
     beliefs = beliefs or Beliefs()
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     refuse_reused(recordings, holdout)
-    recordings = with_sign(recordings, robot)
+    recordings = with_sign(with_temperatures(recordings, holdout), robot)
     given = Given(recordings, robot, frames_named(align), families_named(may_change))
     examined = examine(given, known, apply=apply, beliefs=beliefs)
     progress('data checked')

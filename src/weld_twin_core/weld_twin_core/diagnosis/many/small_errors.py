@@ -101,7 +101,7 @@ def _everything(
                 # Each as the search has found it where it has.
                 each = {seed.key: seed for seed in reversed(kind.search.small(view, joint, most))}
                 small = [have.get(key, seed) for key, seed in reversed(each.items())]
-            elif np.ptp(view.joint(view.robot.index(str(joint)))) >= beliefs.wave_range:
+            elif np.ptp(_ends(features, str(joint))) >= beliefs.wave_range:
                 reported = separable_orders(features, str(joint))
                 small = kind.search.small(view, joint, min(most, reported))
             else:
@@ -192,7 +192,7 @@ class Lines:
     @classmethod
     def of(cls, maker: Maker, ripple: Effect, orders: Array) -> Lines:
         """Return the waves of some orders at the joint of a ripple."""
-        low, high = _ends(maker, ripple)
+        low, high = _ends(maker.features, str(ripple.site))
         piece = maker.piece(ripple.search.with_orders(orders))
         size = 1.0 if piece.joint is None else np.sqrt(piece.joint.square)
         pairs = (piece.each * size).reshape(orders.size, 2, -1)
@@ -221,10 +221,10 @@ class Lines:
         return Piece(self.piece.each[2 * k : 2 * k + 2], self.piece.joint).mixed(step)
 
 
-def _ends(maker: Maker, effect: Effect) -> tuple[float, float]:
-    """Return between which angles the joint of an effect travels."""
-    i = maker.features[0].twin.robot.index(str(effect.site))
-    ends = [(one.reach[0][i], one.reach[1][i]) for one in maker.features]
+def _ends(features: Sequence[Features], joint: str) -> tuple[float, float]:
+    """Return between which angles a joint travels, all recordings together."""
+    i = features[0].twin.robot.index(joint)
+    ends = [(one.reach[0][i], one.reach[1][i]) for one in features]
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
@@ -235,8 +235,7 @@ def lines_of(maker: Maker, effect: Effect, least: float) -> Lines | None:
     least: travel below which nothing is looked for [rad].
     """
     waves = effect.traits.waves
-    low, high = _ends(maker, effect) if waves is not None else (0.0, 0.0)
-    if waves is None or high - low < least:
+    if waves is None or np.ptp(_ends(maker.features, str(effect.site))) < least:
         return None
     most = min(waves.highest, separable_orders(maker.features, str(effect.site)))
     orders = np.arange(waves.dense + 1.0, most + 1.0)

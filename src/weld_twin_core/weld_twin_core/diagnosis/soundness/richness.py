@@ -9,6 +9,7 @@ Was anything recorded twice, or a stream frozen? Does a single reading stand out
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -43,7 +44,7 @@ def _two_arms(case: Case) -> Iterator[Finding]:
 
 
 def _hardly(case: Case) -> Iterator[Finding]:
-    ranges = np.max([np.ptp(q, axis=0) for q in case.motions], axis=0)
+    ranges = np.ptp(np.concatenate(case.motions), axis=0)
     robot = case.model.robot
     names = [
         f'{robot.joint_names[i]!r} ({_moved(ranges[i], bool(robot.prismatic[i]))})'
@@ -111,6 +112,20 @@ def quantity(case: Case) -> Sequence[Finding]:
     if problem.at_rest and total < ENOUGH:
         return (note(f'With {total} stations few causes can be told apart.'),)
     return ()
+
+
+def with_temperatures(
+    recordings: Sequence[Recording], holdout: Sequence[Recording]
+) -> tuple[Recording, ...]:
+    """Return recordings without their temperatures where others have none: what grows is one model."""
+    bare = [r.name for r in (*recordings, *holdout) if r.temperature is None]
+    if not bare:
+        return tuple(recordings)
+    note = f'Its temperature is not used: {listed(bare)} came without one, so record it in all.'
+    return tuple(
+        r if r.temperature is None else replace(r, temperature=None, notes=(*r.notes, note))
+        for r in recordings
+    )
 
 
 def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> None:

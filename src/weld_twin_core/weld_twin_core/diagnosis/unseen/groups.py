@@ -37,6 +37,8 @@ FINE, LEAST_FINE = 3 * KNOTS['angle'], 400
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
+LEAST_PUSHED = 8
+"""Samples of a recording up to which they tell no acceleration."""
 WANDERS = 16
 """Times over a recording at which a lost motion may have another size: a few seconds apart."""
 LOOSE = 100.0
@@ -180,8 +182,8 @@ def _of_joints(problem: Problem, features: list[Features], *, wandering: bool) -
         return
     for index, joint in enumerate(features[0].twin.robot.joint_names):
         columns = [maker.column(('q', index)) for maker in features]
-        if min(m.at.size for m in features) > 8:
-            pushes = (np.gradient(m.view.qd[:, index], m.view.t) for m in features)
+        if max(m.at.size for m in features) > LEAST_PUSHED:
+            pushes = (_push(maker, index) for maker in features)
             each = zip(columns, pushes, strict=True)
             yield joint, 'acceleration', [column[None] * push for column, push in each], ()
         if max(float(np.ptp(m.run.view.q[:, index])) for m in features) > LEAST['angle']:
@@ -217,7 +219,7 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
     elif not problem.untracked and features[0].view.robot.gravity.any():
         for hanging in zip(*map(_hanging, features), strict=True):
             yield 'tool', 'load', list(hanging), ()
-    if all(PedestalTilt.applicable(maker.view, None) is None for maker in features):
+    if any(PedestalTilt.applicable(maker.view, None) is None for maker in features):
         yield 'base', 'load', [_leaning(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
         views = [(maker, maker.view) for maker in features]
@@ -339,6 +341,13 @@ def _grown(maker: Features) -> Array:
     robot = maker.twin.robot
     lengths = [((k, i), float(getattr(robot, k)[i])) for i in range(robot.n) for k in ('a', 'd')]
     return np.asarray(sum(length * maker.column(channel) for channel, length in lengths if length))
+
+
+def _push(maker: Features, index: int) -> Array:
+    """Return how a joint is accelerated (M,); none in a recording of too few samples to tell."""
+    if maker.at.size <= LEAST_PUSHED:
+        return np.zeros(maker.at.size)
+    return np.gradient(maker.view.qd[:, index], maker.view.t)
 
 
 def _wandering(maker: Features, index: int) -> Array:

@@ -1,0 +1,92 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What several recordings show together, though they differ in length, rate, motion and streams."""
+
+import numpy as np
+import pytest
+from small_arm import small_arm
+
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.library import build
+from weld_twin_core.diagnosis.many.small_errors import _everything
+from weld_twin_core.diagnosis.soundness.richness import with_temperatures
+from weld_twin_core.diagnosis.unseen.groups import all_groups
+from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core.twin.twin import Twin
+
+ELBOW = small_arm().joint_names[2]
+
+
+def swing(seconds, elbow=0.6, rate=50.0, *, warm=False, offset=0.0):
+    """Return a recording of an arm without errors whose joints swing, the elbow as far as told."""
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    far = np.array([0.6, 0.6, elbow])
+    q = [0.1, -1.2, 1.5 + offset] + far * np.sin(np.outer(t, [0.4, 0.7, 1.0]))
+    return posed(q, t, temperature=Signal(t, 20.0 + t) if warm else None)
+
+
+def posed(q, t, **streams):
+    bare = Recording(f'{len(t)} samples', JointMotion(t, q), **streams)
+    poses = Twin(small_arm()).poses(bare, t)
+    return bare.with_measured(Measurements(t, poses.position, poses.rotation))
+
+
+def together(*recordings):
+    """Return the problem of recordings, and the arm without errors."""
+    arm = small_arm()
+    return Problem(recordings), Model(arm, (arm.T_world_base,) * len(recordings))
+
+
+def groups(*recordings):
+    problem, model = together(*recordings)
+    return {str(group) for group in all_groups(problem, model, problem.unit_scale())}
+
+
+def test_few_stations_beside_a_long_recording_stay_whole():
+    few, long = swing(0.4), swing(400.0)
+    thin = Problem((few, long)).thinned(3000)
+    assert thin.samples == (20, 480)
+    assert Problem((long, few)).thinned(3000).samples == (480, 20)
+
+
+@pytest.mark.parametrize('most', [600, 3000, 6000])
+def test_a_thinned_problem_has_as_many_rows_as_wanted_and_the_ends_of_every_recording(most):
+    recordings = [swing(seconds) for seconds in (2.0, 20.0, 5.0, 60.0)]
+    thin = Problem(tuple(recordings)).thinned(most)
+    assert thin.size == pytest.approx(most, abs=6 * len(recordings))
+    for whole, part in zip(recordings, thin.recordings, strict=True):
+        np.testing.assert_array_equal(part.seen.t[[0, -1]], whole.seen.t[[0, -1]])
+    counts = dict(zip((2.0, 20.0, 5.0, 60.0), thin.samples, strict=True))
+    assert [counts[k] for k in sorted(counts)] == sorted(thin.samples)
+
+
+def test_waves_of_a_joint_are_looked_for_though_another_recording_moved_it_more_to_and_fro():
+    often, wide = swing(60.0, elbow=0.1, rate=20.0), swing(7.0, elbow=1.2, rate=60.0)
+    found = _everything(*together(often, wide), (), Beliefs())
+    assert any(e.name == 'transmission_ripple' and e.site == ELBOW for e in found)
+
+
+@pytest.mark.parametrize('seconds', [0.02, 0.1, 0.16])
+def test_a_recording_of_a_few_samples_takes_no_place_of_a_fault_from_the_others(seconds):
+    assert groups(swing(20.0), swing(seconds)) >= groups(swing(20.0))
+
+
+def test_an_arm_that_stands_in_one_recording_may_lean_under_its_load_in_the_others():
+    moved = swing(20.0)
+    still = posed(np.repeat(moved.joints.q[:1], 100, axis=0), moved.joints.t[:100])
+    assert groups(moved, still) >= groups(moved)
+
+
+@pytest.mark.parametrize('turned', [1, -1])
+def test_recordings_of_which_one_has_no_temperature_are_explained_without(turned):
+    warm, bare = swing(10.0, warm=True), swing(12.0)
+    given = (warm, bare)[::turned]
+    kept = with_temperatures(given, ())
+    problem, model = together(*kept)
+    absent = build(problem, model, problem.unit_scale()).absent
+    assert absent['thermal_growth'] == 'no temperature was recorded'
+    (note,) = kept[given.index(warm)].notes
+    assert bare.name in note
+    assert with_temperatures([warm], [bare])[0].temperature is None
+    assert with_temperatures([warm], [warm])[0] is warm

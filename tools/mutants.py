@@ -57,7 +57,7 @@ TESTS = {
     'hypotheses': 'impossible_effects swapped_alternatives carrying needed_kinds unseen_stretches',
     'frames': 'alignment changes known_places touches steps_by_hand',
     'soundness': 'alignment checks_by_hand mends mixups_by_hand soundness trials steps_by_hand bundle '
-    'touch_mistakes',
+    'touch_mistakes tracker_beside',
     'unseen': 'unseen_stretches chance folds levels noise_and_interval steps_by_hand '
     'touch_mistakes touches known_places fit many_small_errors',
     'many': 'many_small_errors small_errors learned_priors needed_kinds',

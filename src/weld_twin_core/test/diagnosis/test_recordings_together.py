@@ -90,3 +90,15 @@ def test_recordings_of_which_one_has_no_temperature_are_explained_without(turned
     assert bare.name in note
     assert with_temperatures([warm], [bare])[0].temperature is None
     assert with_temperatures([warm], [warm])[0] is warm
+
+
+@pytest.mark.parametrize('other', [0.0, 0.7])
+def test_a_tool_that_each_seam_holds_alike_is_looked_at_for_its_sag_where_seams_differ(other):
+    t = np.arange(0.0, 4.0, 0.1)
+    about = 0.4 * np.sin(t)  # of the upright axis alone
+    seams = [posed(np.stack([about, 0 * t - 1.2, 0 * t + q], -1), t) for q in (1.5, 1.5 + other)]
+    problem, model = together(*seams)
+    shelf = build(problem, model, problem.unit_scale())
+    reason = 'the tool does not turn against gravity'
+    assert shelf.absent.get('tool_sag') == (None if other else reason)
+    assert any(unit.site.effect == 'tool_sag' for unit in shelf.units) is bool(other)

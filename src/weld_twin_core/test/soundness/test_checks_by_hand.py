@@ -12,7 +12,7 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.soundness.computed import _gap
-from weld_twin_core.diagnosis.soundness.efforts import efforts, with_sign
+from weld_twin_core.diagnosis.soundness.efforts import compared, efforts, with_sign
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
 from weld_twin_core.diagnosis.soundness.gate import Examined, _gave_way
 from weld_twin_core.diagnosis.soundness.images import _undone
@@ -422,6 +422,16 @@ def test_efforts_tell_whether_they_hold_the_load_and_what_nobody_said_that_hangs
     (agreed,) = efforts(Case(*asked(heavy, known)))
     assert 'correlate by 1.00' in agreed.sentence
     assert not efforts(Case(*asked(robot, run)))
+
+
+def test_noise_of_efforts_makes_nothing_a_cause_that_explains_none_of_the_difference(rng):
+    robot = load('ur10e')
+    run = recorded(robot, stations(robot, rng, 400), rng, points=True)
+    heavy = replace(robot, payload_mass=robot.payload_mass + 3.0)
+    effort = with_expected_effort(run, heavy, -1.0).effort
+    shaken = effort.value + rng.normal(scale=6.0, size=effort.value.shape)
+    (known,) = with_sign([replace(run, effort=replace(effort, value=shaken))], robot)
+    assert [cause.name for cause in compared([known], robot).causes] == ['payload']
 
 
 def test_efforts_in_another_unit_are_refused_with_what_it_may_be(rng):

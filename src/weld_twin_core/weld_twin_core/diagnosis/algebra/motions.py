@@ -10,7 +10,9 @@ postures all over its range: the offset of the first link lifts the tool exactly
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +54,34 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
     i = robot.index(effect.search.moved_by)
     travel = max(m.reach[1][i] for m in features) - min(m.reach[0][i] for m in features)
     return bool(travel < (STILL_SLIDE if robot.prismatic[i] else STILL))
+
+
+def lacking(features: Sequence[Features], kind: type[Effect], joint: str | None) -> str | None:
+    """
+    Return why neither a recording nor all together show a kind on a joint; None where one does.
+
+    A torch held alike along each of two seams may be held otherwise along the other.
+    """
+    reasons = [kind.applicable(maker.view, joint) for maker in features]
+    if None in reasons or len(reasons) == 1:
+        return None if None in reasons else reasons[0]
+    return kind.applicable(_together([maker.view for maker in features]), joint)
+
+
+def _together(views: Sequence[View]) -> View:
+    """Return the samples of all recordings as those of one; when each was taken means nothing."""
+
+    def joined(name: str) -> Array | None:
+        each = [getattr(view, name) for view in views]
+        return None if any(value is None for value in each) else np.concatenate(each)
+
+    named: dict[str, Any] = {
+        name: joined(name) for name in ('q', 'qd', 'wrench', 'temperature', 'effort')
+    }
+    count = np.arange(float(sum(view.t.size for view in views)))
+    static = all(view.static for view in views)
+    loads = {at: np.concatenate([v.shift[at] for v in views]) for at in views[0].shift}
+    return replace(views[0], t=count, elapsed=count, static=static, shift=loads, **named)
 
 
 def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:

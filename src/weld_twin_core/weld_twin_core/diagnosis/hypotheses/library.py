@@ -15,6 +15,7 @@ from ..algebra.motions import (
     REASON,
     candidate_kinds,
     hardly_moves,
+    lacking,
     moved_most,
     separable_orders,
     set_instead,
@@ -64,8 +65,7 @@ class _Shelf:
 
     def add(self, kind: type[Effect], joint: str | None) -> None:
         """Add a family on a joint, or tell why it is absent."""
-        reasons = [kind.applicable(maker.view, joint) for maker in self.features]
-        if (reason := reasons[0]) is not None and None not in reasons:
+        if (reason := lacking(self.features, kind, joint)) is not None:
             self.absent.setdefault(kind.name, reason)
             return
         result, trials = self._seeds(kind, joint)

@@ -37,7 +37,7 @@ from ..algebra.fit import (
     stepped,
 )
 from ..algebra.learned_sizes import learned_precision, projected
-from ..algebra.motions import candidate_kinds, hardly_moves, moved_most, separable_orders
+from ..algebra.motions import candidate_kinds, hardly_moves, lacking, moved_most, separable_orders
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.unseen_stretches import Unseen
@@ -95,7 +95,7 @@ def _everything(
             continue
         for joint in joints_of(kind, model.robot):
             view = features[moved_most(features, joint)].view
-            if kind.applicable(view, joint) is not None:
+            if lacking(features, kind, joint) is not None:
                 continue
             if kind.traits.waves is None:
                 # Each as the search has found it where it has.

@@ -7,9 +7,11 @@ import pytest
 from small_arm import small_arm
 
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.algebra.workspace import Role
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.diagnosis.many.small_errors import _everything
+from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.diagnosis.soundness.richness import with_temperatures
 from weld_twin_core.diagnosis.unseen.groups import all_groups
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
@@ -102,3 +104,14 @@ def test_a_tool_that_each_seam_holds_alike_is_looked_at_for_its_sag_where_seams_
     reason = 'the tool does not turn against gravity'
     assert shelf.absent.get('tool_sag') == (None if other else reason)
     assert any(unit.site.effect == 'tool_sag' for unit in shelf.units) is bool(other)
+
+
+@pytest.mark.parametrize('lift', [-1.1, -2.0])
+def test_play_that_the_load_turns_over_is_looked_for_where_recordings_lie_on_either_side(lift):
+    t = np.arange(0.0, 4.0, 0.1)
+    seams = [posed(np.stack([0 * t, 0.2 * np.sin(t) + q, 0 * t], -1), t) for q in (-1.1, lift)]
+    problem, model = together(*seams)
+    shelf = build(problem, model, problem.unit_scale())
+    site = Site('loaded_play', small_arm().joint_names[1])
+    (role,) = [unit.role for unit in shelf.units if unit.site == site]
+    assert role is (Role.ALIKE if lift == -1.1 else Role.FOUND)

@@ -65,11 +65,12 @@ def lacking(features: Sequence[Features], kind: type[Effect], joint: str | None)
     reasons = [kind.applicable(maker.view, joint) for maker in features]
     if None in reasons or len(reasons) == 1:
         return None if None in reasons else reasons[0]
-    return kind.applicable(_together([maker.view for maker in features]), joint)
+    return kind.applicable(together(features), joint)
 
 
-def _together(views: Sequence[View]) -> View:
+def together(features: Sequence[Features]) -> View:
     """Return the samples of all recordings as those of one; when each was taken means nothing."""
+    views = [maker.view for maker in features]
 
     def joined(name: str) -> Array | None:
         each = [getattr(view, name) for view in views]

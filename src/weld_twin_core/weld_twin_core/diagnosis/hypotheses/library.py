@@ -19,6 +19,7 @@ from ..algebra.motions import (
     moved_most,
     separable_orders,
     set_instead,
+    together,
 )
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.workspace import Library, Role, SeedSystems, Unit
@@ -86,11 +87,18 @@ class _Shelf:
             most = min(kind.traits.waves.dense, separable_orders(self.features, joint))
             lines = kind.search.lines(joint, np.arange(1.0, most + 1.0))
             return lines, float(len(lines))
-        k, pull = moved_most(self.features, joint), None
+        k, pull, own = moved_most(self.features, joint), None, None
         if joint is not None:
             moved = self._maker.moved(self.features[k].twin.robot.index(joint))
-            pull = np.split(moved.summed(self._residual), self._ends[:-1])[k]
-        return self.features[k].seeds(kind, joint, pull)
+            pull = moved.summed(self._residual)
+            own = np.split(pull, self._ends[:-1])[k]
+        result, trials = self.features[k].seeds(kind, joint, own)
+        if result or len(self.features) == 1 or kind.stage in (Stage.SERVO, Stage.PLAY):
+            return result, trials
+        # A load that lies on one side in each recording may lie on the other in the next.
+        view = together(self.features)
+        result = list(kind.seeds(view, joint, pull))
+        return result, kind.search.trials(view, joint) or float(len(result))
 
     def _constants(self, kind: type[Effect], joint: str | None) -> list[Effect]:
         """Return instances that are no more than a constant of a joint on these motions."""

@@ -149,7 +149,7 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
     listed, monkeypatch
 ):
     file, db = listed
-    monkeypatch.setattr('weld_twin_report.history.opening.BUSY', 0.1)
+    monkeypatch.setattr('weld_twin_report.history.schema.BUSY', 0.1)
     words = ('history', 'run', file, '--db', db, '--workers', '1')
     real = Database.write
 

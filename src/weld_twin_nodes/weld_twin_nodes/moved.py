@@ -16,7 +16,7 @@ _ROOMS = ('demo', 'fleet', 'guarded', 'history', 'report', 'sensitivity_report',
 _INTO = {
     'report': 'family_table answer cause_cards cause_list curve_plot charts root_frame controllers '
     'pdf diagnosis_files',
-    'history': 'migrations schema tracking words',
+    'history': 'migrations schema opening schema tracking words',
     'fleet': 'listed running',
     'demo': 'closed_loop_page closed_loop demo_diagnosis analysis live_run analysis hand_over analysis',
     'serve': 'connections access bodies uploads',

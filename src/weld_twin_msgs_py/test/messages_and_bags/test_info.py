@@ -10,7 +10,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.bursts import ONE_CLOCK
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagWriter, bag_info, read_recording, write_recording
-from weld_twin_msgs_py.bags.ends import COMPLETENESS, Ends, never_recorded, uneven_ends
+from weld_twin_msgs_py.bags.needed import COMPLETENESS, Ends, never_recorded, uneven_ends
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import TopicNames
 

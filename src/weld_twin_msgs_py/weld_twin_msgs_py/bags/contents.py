@@ -15,8 +15,7 @@ from weld_twin_core.bursts import ONE_CLOCK, Bursts, apart, bursts
 
 from ..assembly.foreign_types import split_topic
 from ..messages.topics import BY_NAME, CONTACT, TopicNames
-from .ends import GAP, Ends, never_recorded, uneven_ends
-from .needed import TYPES, no_joints, no_measurements
+from .needed import GAP, TYPES, Ends, never_recorded, no_joints, no_measurements, uneven_ends
 from .reader import BagReader
 
 

@@ -23,9 +23,16 @@ from ..assembly.foreign_types import FedBack, plain_messages, plain_poses, split
 from ..assembly.joint_states import names_called
 from ..messages.from_messages import stamp_ns
 from ..messages.topics import CONTACT, TopicNames
-from .ends import Ends, never_recorded, uneven_ends
 from .images import images, looking
-from .needed import TYPES, no_joints, no_measurements, other_names
+from .needed import (
+    TYPES,
+    Ends,
+    never_recorded,
+    no_joints,
+    no_measurements,
+    other_names,
+    uneven_ends,
+)
 from .reader import BagReader
 from .regular import LEFT_OUT, Stream, fill_regular
 

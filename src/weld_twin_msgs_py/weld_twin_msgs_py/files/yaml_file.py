@@ -81,20 +81,15 @@ _Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
 def read_text(path: Path | str, kind: str) -> str:
     """Return the text of a small file."""
     try:
-        data = _small(Path(path), kind)
+        with Path(path).open('rb') as file:
+            data = file.read(SIZE_LIMIT + 1)
+        if len(data) > SIZE_LIMIT:
+            raise ModelError(f"{kind} '{path}' is larger than {SIZE_LIMIT / 1e6:g} MB")
         return data.decode('utf-8-sig')
     except UnicodeDecodeError:
         raise ModelError(f"{kind} '{path}' is not UTF-8 text") from None
     except OSError as error:
         raise ModelError(f"{kind} '{path}' cannot be read: {error.strerror or error}") from None
-
-
-def _small(path: Path, kind: str) -> bytes:
-    with path.open('rb') as file:
-        data = file.read(SIZE_LIMIT + 1)
-    if len(data) > SIZE_LIMIT:
-        raise ModelError(f"{kind} '{path}' is larger than {SIZE_LIMIT / 1e6:g} MB")
-    return data
 
 
 def read_yaml(path: Path | str, kind: str) -> Any:

@@ -141,7 +141,6 @@ class KrlReader(Reader):
         self.used: list[set[int]] = [set() for _ in sources]
         self.turns: dict[int, int] = {}
         self.state = _State()
-        self.kinematic = ''
         self.tools: list[Frame] = []
         self.bases: list[Frame] = []
         self.blocks = Blocks(
@@ -293,7 +292,7 @@ class KrlReader(Reader):
         if what[:5] in ('$BASE', '$TOOL'):
             along = _ALONG.match(value) if what == '$BASE' else None
             if along is not None:
-                self._second_kinematic(along[1])
+                self.take_positioner(along[1], 'it works with the external kinematic systems')
                 start += along.end()
                 end -= 1
                 value = self.text[start:end].strip()
@@ -380,15 +379,6 @@ class KrlReader(Reader):
             self.used[file].add(start)
             return self.program.points[point].value
         return self.frames.get(re.sub(r'\s', '', text.upper()))
-
-    def _second_kinematic(self, index: str) -> None:
-        """Refuse two external kinematic systems in one program: a robot file has one positioner."""
-        self.kinematic = self.kinematic or index
-        if index != self.kinematic:
-            raise DataError(
-                f'{self.source.name}: it works with the external kinematic systems '
-                f'{self.kinematic} and {index}, and a robot file has one positioner; split it'
-            )
 
     def _speed(self, start: int, end: int, default: float) -> float:
         return max(self.value((start, end), default), LEAST_SPEED)

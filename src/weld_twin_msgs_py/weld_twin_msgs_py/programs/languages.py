@@ -13,10 +13,9 @@ from weld_twin_core.errors import DataError
 
 from .build import Program
 from .context import Context
-from .csv_points import CSV_POSE, CsvReader
 from .fanuc_ls import FanucReader
 from .inform import InformReader
-from .joint_trajectory import TrajectoryReader
+from .joint_points import CSV_POSE, CsvReader, TrajectoryReader
 from .krl import KrlReader
 from .rapid import RapidReader
 from .reader import Reader

@@ -130,7 +130,6 @@ class RapidReader(Reader):
         self.entered: dict[str, tuple[Frame, list[Frame]]] = {}
         """By routine the shift with which it begins, and those where it is called."""
         self.blocks = Blocks(self.program, shift=unclear_shift)
-        self.unit = ''
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
@@ -224,12 +223,7 @@ class RapidReader(Reader):
         """Return a work object that a mechanical unit moves: the unit has its user frame itself."""
         if not self.context.controller.external:
             return Frame('', why=f'{name} moves')
-        self.unit = self.unit or unit
-        if unit != self.unit:
-            raise DataError(
-                f'{self.source.name}: its work objects go along with {self.unit} and {unit}, and a '
-                'robot file has one positioner; split it'
-            )
+        self.take_positioner(unit, 'its work objects go along with')
         self.program.notes.append(f'{unit} is taken to be the positioner, for {name} goes along')
         return Frame('', frame, True)
 

@@ -47,6 +47,8 @@ class Reader(ABC):
         self.shift = Frame('')
         """Why moves go elsewhere than their points say, where the text is read."""
         self.routines = 0
+        self.positioner = ''
+        """The external kinematic system that bases go along with."""
 
     @abstractmethod
     def read(self) -> Program:
@@ -186,6 +188,15 @@ class Reader(ABC):
             shift = Frame('', why=why.format(self.where(match)))
             for piece in self.program.pieces:
                 piece[:] = [replace(step, shift=shift) for step in piece]
+
+    def take_positioner(self, name: str, goes_along: str) -> None:
+        """Refuse a second external kinematic system: a robot file has one positioner."""
+        self.positioner = self.positioner or name
+        if name != self.positioner:
+            raise DataError(
+                f'{self.source.name}: {goes_along} {self.positioner} and {name}, and a robot file has '
+                'one positioner; split it'
+            )
 
     def unknown(self, kind: Kind, match: re.Match[str], why: str) -> None:
         """Add a move that is not understood."""

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ LENSES = ('plumb_bob', 'rational_polynomial')
 """Models of distortion that are understood; coefficients in the order of OpenCV."""
 BOARDS = ('charuco', 'chessboard', 'tags')
 """Boards whose points follow from a few numbers."""
+_A_BOARD = f'board: {" | ".join(BOARDS)}'
 ROUND = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 """Corners of a tag in its side, clockwise from the upper left: x to the right, y down."""
 AXES = ('x', 'y', 'z')
@@ -48,7 +50,8 @@ def read_camera(name: str, path: Path | str) -> Camera:
 
     """
     entry = read_yaml(path, 'camera file')
-    try:
+    needs = 'camera_matrix with nine numbers under data, and distortion_coefficients'
+    with _understood(f"camera file '{path}'", 'is no camera_info', needs):
         matrix = _numbers(entry['camera_matrix'], 9)
         bent = _numbers(entry.get('distortion_coefficients', []), None)
         model = str(entry.get('distortion_model', LENSES[0]))
@@ -61,13 +64,6 @@ def read_camera(name: str, path: Path | str) -> Camera:
         size = (int(entry.get('image_width', 0)), int(entry.get('image_height', 0)))
         mount = str(entry.get('mount', 'world'))
         return Camera(name, lens, mount, size if min(size) > 0 else None)
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise DataError(
-            f"camera file '{path}' is no camera_info: {_missing(error)}; it needs camera_matrix "
-            'with nine numbers under data, and distortion_coefficients'
-        ) from None
-    except DataError as error:
-        raise DataError(f"camera file '{path}': {error}") from None
 
 
 def read_target(name: str, path: Path | str, mount: str | None = None) -> Target:
@@ -93,34 +89,23 @@ def read_target(name: str, path: Path | str, mount: str | None = None) -> Target
     if path.suffix.lower() not in ('.yaml', '.yml', '.json'):
         return _of_table(name, path, mount or 'tool')
     entry = read_yaml(path, 'target file')
-    try:
+    needs = f'points, or {_A_BOARD} with squares: [columns, rows] and square: in metres'
+    with _understood(f"target file '{path}'", 'cannot be understood', needs):
         points = _points(entry)
         sigma, own = float(entry.get('sigma', PLACED)), str(entry.get('mount', mount or 'tool'))
         places = np.array([*points.values()], dtype=float)
         return Target(name, tuple(points), places, own, sigma, facing='board' in entry)
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise DataError(
-            f"target file '{path}' cannot be understood: {_missing(error)}; it needs points, or "
-            f'board: {" | ".join(BOARDS)} with squares: [columns, rows] and square: in metres'
-        ) from None
-    except DataError as error:
-        raise DataError(f"target file '{path}': {error}") from None
 
 
 def read_board(path: Path | str) -> Mapping[str, Any]:
     """Return the numbers of a board: ``board``, ``squares``, ``square`` and what else the file has."""
     entry = read_yaml(path, 'board file')
-    try:
+    needs = (
+        f'{_A_BOARD}, squares: [columns, rows] and square: in metres, or of tags their size: and '
+    )
+    with _understood(f"board file '{path}'", 'cannot be understood', f'{needs}tags: by number'):
         board_points(entry)
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(
-            f"board file '{path}' cannot be understood: {_missing(error)}; it needs "
-            f'board: {" | ".join(BOARDS)}, squares: [columns, rows] and square: in metres, or of '
-            'tags their size: and tags: by number'
-        ) from None
-    except DataError as error:
-        raise DataError(f"board file '{path}': {error}") from None
-    return dict(entry)
+        return dict(entry)
 
 
 def board_points(entry: Mapping[str, Any]) -> dict[str, Array]:
@@ -190,5 +175,13 @@ def _numbers(entry: Any, count: int | None) -> Array:
     return out
 
 
-def _missing(error: Exception) -> str:
-    return f'{error} is missing' if isinstance(error, KeyError) else str(error)
+@contextmanager
+def _understood(file: str, wrong: str, needs: str) -> Iterator[None]:
+    """Report what a file lacks, or has of another kind, in a sentence: what is wrong, what it needs."""
+    try:
+        yield
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        why = f'{error} is missing' if isinstance(error, KeyError) else error
+        raise DataError(f'{file} {wrong}: {why}; it needs {needs}') from None
+    except DataError as error:
+        raise DataError(f'{file}: {error}') from None

@@ -53,11 +53,7 @@ def write_touches(path: Path, motion: Mapping[str, Any]) -> None:
     """
     Write postures and what each touches, as `read_contacts` reads them.
 
-    Parameters
-    ----------
-    motion : mapping
-        'joint_names', 'q' [rad, m] and 'contact', one label per posture.
-
+    motion: 'joint_names', 'q' [rad, m] and 'contact', one label per posture.
     """
     rows = [
         (*(f'{value:.7f}' for value in q), label)

@@ -117,12 +117,8 @@ class DeviationMarkers(CellNode):
 
     def time_went_back(self) -> None:
         """Begin the picture anew."""
-        self._lines = DeviationLines(
-            self.setting('magnification'),
-            self.setting('tolerance'),
-            self.setting('spacing'),
-            self.setting('points'),
-        )
+        names = ('magnification', 'tolerance', 'spacing', 'points')
+        self._lines = DeviationLines(*map(self.setting, names))
         self._drawn = 0
 
     def _on_base(self, message: Any) -> None:

@@ -18,13 +18,12 @@ from std_srvs.srv import Trigger
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
-from weld_twin_msgs_py.bags.ends import COMPLETENESS
+from weld_twin_msgs_py.bags.needed import COMPLETENESS
 from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION, TOPICS
 
-from .asked_nodes import AskedNodes
 from .cell_node import CellNode
-from .completeness import AT_START, SentBook, Shortfall, shortfall
+from .completeness import AT_START, AskedNodes, SentBook, Shortfall, shortfall
 from .managed_node import ManagedNode
 from .recorded_topic import RecordedTopic, offered_channel
 from .run_node import run

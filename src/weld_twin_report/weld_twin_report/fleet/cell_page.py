@@ -57,13 +57,14 @@ def cell_page(
     entries = database.entries(cell, NEWEST)
     runs = Runs(database)
     changes = runs.look(cell, entries)
+    rows = [row(entry, CAUSES) for entry in entries[: -ROWS - 1 : -1]]
     body = tag(
         'main',
         _head(cell, home, ways, f'{entries[-1].robot} · {_span(entries)}'),
         tag('section#verdict', tag('h1', _headline(entries, changes)), _figures(entries)),
         _changed(changes),
         _charts(entries, changes),
-        _diagnoses(entries),
+        section('Last diagnoses', table(HEADS, rows), id_='diagnoses'),
         troubles_section(runs.troubles(cell)[:TROUBLES]),
     )
     return document(f'{cell} · history', body, charts=True, style=STYLE)
@@ -175,20 +176,12 @@ def _value(entry: Entry, name: str) -> float:
     return float(entry.value[entry.names.index(name)]) if name in entry.names else np.nan
 
 
-def _diagnoses(entries: Sequence[Entry]) -> Html:
-    """Return the newest diagnoses as a table."""
-    rows = [row(entry, CAUSES) for entry in entries[: -ROWS - 1 : -1]]
-    return section('Last diagnoses', table(HEADS, rows), id_='diagnoses')
-
-
-def troubles_section(
-    troubles: Sequence[Run], link: Callable[[str], str] | None = None
-) -> Html | None:
+def troubles_section(troubles: Sequence[Run]) -> Html | None:
     """Return the recordings without a verdict, and why; None for none."""
     if not troubles:
         return None
     shown: dict[str, Callable[[Run], Child]] = {
-        'cell': lambda run: tag('a', run.cell, href=link(run.cell)) if link else run.cell,
+        'cell': lambda run: run.cell,
         'recording': lambda run: run.recording.rsplit('/', 1)[-1],
         'state': lambda run: run.state,
         'why': lambda run: run.sentence,

@@ -4,7 +4,7 @@
 
 from .database import Database
 from .entry import Entry, entry_of
-from .opening import Unavailable
+from .schema import Unavailable
 from .words import observations
 
 __all__ = ['Database', 'Entry', 'Unavailable', 'entry_of', 'observations']

@@ -23,19 +23,22 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from .entry import ARRAYS, Entry
-from .opening import (
+from .schema import (
+    VERSION,
     WRITES,
     Unavailable,
     alone,
     bring_up,
     engine_of,
+    not_a_cell,
     passes,
     refuse_missing,
+    schema,
+    stored,
     unavailable,
     version_of,
     waits,
 )
-from .schema import VERSION, not_a_cell, schema, stored
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Row
@@ -123,7 +126,7 @@ class Database:
                 'its own date with --at'
             )
         made = connection.execute(verdicts.insert().values(cell_id=number, **_row(entry)))
-        return _key(made)
+        return key_of(made)
 
     def _number(self, connection: Connection, cell: str, entry: Entry) -> int:
         """Return the number of a cell, held until the transaction ends; refuse another robot."""
@@ -135,7 +138,11 @@ class Database:
         # Whoever writes to the same cell waits here, and then sees what was written.
         query = self.sql.select(cells).where(cells.c.name == cell).with_for_update()
         row = connection.execute(query).one()
-        _same_robot(cell, row, entry)
+        if row.kinematics != entry.kinematics:
+            raise Refused(
+                f'cell {cell!r} has the robot {row.robot!r}, and this diagnosis is of '
+                f'{entry.robot!r} with other kinematics; add it to a cell of its own'
+            )
         return int(row.id)
 
     def insert(self, table: Any) -> Any:
@@ -227,7 +234,8 @@ class Database:
             raise kind(f"the history '{self.url}' cannot be used: {said}") from None
 
 
-def _key(made: Any) -> int:
+def key_of(made: Any) -> int:
+    """Return the number of a row that was inserted."""
     assert made.inserted_primary_key is not None
     return int(made.inserted_primary_key[0])
 
@@ -240,14 +248,6 @@ def there_already(row: Any, at: datetime, cell: str) -> bool:
             'where it is wrong, begin a history anew (--db) with the right dates'
         )
     return row is not None
-
-
-def _same_robot(cell: str, row: Row[Any], entry: Entry) -> None:
-    if row.kinematics != entry.kinematics:
-        raise Refused(
-            f'cell {cell!r} has the robot {row.robot!r}, and this diagnosis is of {entry.robot!r} with '
-            'other kinematics; add it to a cell of its own'
-        )
 
 
 def _row(entry: Entry) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from weld_twin_core.errors import DataError
 
 from .database import Damaged, Database, Refused
 from .entry import Entry
-from .opening import Unavailable
+from .schema import Unavailable
 from .words import as_dict, changed, observations
 
 if TYPE_CHECKING:

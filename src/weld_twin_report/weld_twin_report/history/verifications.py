@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
-from .database import Database, there_already
+from .database import Database, key_of, there_already
 from .entry import date_of_stamp
 from .schema import stored
 
@@ -71,14 +71,8 @@ def put_verified(
     )
     if there_already(connection.execute(query).first(), result.at, cell):
         return None
-    values = {
-        'at': stored(result.at),
-        'recording': result.recording,
-        'content': dict(result.content),
-    }
-    made = connection.execute(rows.insert().values(cell_id=own.id, **values))
-    assert made.inserted_primary_key is not None
-    return int(made.inserted_primary_key[0])
+    values = {**result._asdict(), 'at': stored(result.at), 'content': dict(result.content)}
+    return key_of(connection.execute(rows.insert().values(cell_id=own.id, **values)))
 
 
 def verifications(database: Database, cell: str) -> list[Verified]:

@@ -53,7 +53,10 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
         _print_table(console, 'candidates', heads, rows[:_MOST])
     for names in answer.open:
         console.print(f'[yellow]cannot tell apart:[/] {escape(names)}')
-    _print_changed(answer, console)
+    if answer.changed is not None and answer.changed.rows:
+        _print_table(console, *answer.changed)
+    elif answer.changed is not None:
+        console.print(escape(answer.nothing_changed))
     _print_data(diagnosis, console)
     _print_holds(answer, console)
     for action in answer.to_do:
@@ -69,15 +72,6 @@ def _print_data(diagnosis: Diagnosis, console: Console) -> None:
             console.print(f'[dim]note:[/] {escape(recording.name)}: {escape(note)}')
     if diagnosis.contacts is not None:
         console.print(escape(contacts_sentence(diagnosis.contacts)))
-
-
-def _print_changed(answer: Answer, console: Console) -> None:
-    """Print what changed between the recordings, where that was asked."""
-    changed = answer.changed
-    if changed is not None and changed.rows:
-        _print_table(console, *changed)
-    elif changed is not None:
-        console.print(escape(answer.nothing_changed))
 
 
 def _print_holds(answer: Answer, console: Console) -> None:

@@ -55,35 +55,31 @@ def study_directory(path: Path | str) -> Path:
     return place
 
 
-def write_drawing(place: Path, drawing: Drawing) -> None:
-    """Write a figure and its data."""
-    write_text(place / f'{drawing.name}.svg', drawing.svg, overwrite=True)
-    write_text(place / f'{drawing.name}.csv', drawing.csv, overwrite=True)
-
-
 def write_study(place: Path, result: dict[str, Any], tolerances: Sequence[Tolerance]) -> None:
     """Write the results of a study, its tolerances and its indices."""
     entries = [tolerance.to_mapping() for tolerance in tolerances]
     write_text(place / 'tolerances.yaml', yaml_text(entries), overwrite=True)
-    write_text(place / 'indices.csv', indices_csv(result), overwrite=True)
+    header = ('motion', 'by', 'output', 'name', 'S1', 'S1_half', 'ST', 'ST_half')
+    write_text(place / 'indices.csv', csv_text(header, _indices(result)), overwrite=True)
     write_json(place / RESULT, {**result, 'version': __version__}, overwrite=True)
 
 
 def write_claims(place: Path, result: dict[str, Any]) -> None:
     """Write the claims table in every form, and the measurements behind it."""
-    write_text(place / 'claims.csv', claims_csv(result), overwrite=True)
-    write_text(place / 'claims-cases.csv', cases_csv(result), overwrite=True)
+    heads = ['claim', 'statement', 'where', 'verdict', 'held', 'cases', 'reason']
+    cases = result['cases']
+    for name, keys, rows in (
+        ('claims.csv', heads, result['claims']),
+        ('claims-cases.csv', list(cases[0]), cases),
+    ):
+        text = csv_text(keys, ([row.get(key, '') for key in keys] for row in rows))
+        write_text(place / name, text, overwrite=True)
     write_text(place / 'claims.md', claims_markdown(result), overwrite=True)
     write_json(place / CLAIMS, {**result, 'version': __version__}, overwrite=True)
 
 
-def indices_csv(result: dict[str, Any]) -> str:
-    """Return every index of every motion, grouping and output, a row each."""
-    header = ('motion', 'by', 'output', 'name', 'S1', 'S1_half', 'ST', 'ST_half')
-    return csv_text(header, _rows(result))
-
-
-def _rows(result: dict[str, Any]) -> Iterator[list[Any]]:
+def _indices(result: dict[str, Any]) -> Iterator[list[Any]]:
+    """Yield every index of every motion, grouping and output, a row each."""
     for motion, outcome in result['motions'].items():
         for by, outputs in outcome['global']['sobol'].items():
             for output, indices in outputs.items():
@@ -133,7 +129,8 @@ def make_figures(place: Path, setting: Setting, keys: Sequence[str]) -> list[Dra
     result = [draw(setting, key) for key in keys]
     drawings = [drawing for drawing in result if drawing is not None]
     for drawing in drawings:
-        write_drawing(place, drawing)
+        write_text(place / f'{drawing.name}.svg', drawing.svg, overwrite=True)
+        write_text(place / f'{drawing.name}.csv', drawing.csv, overwrite=True)
     return drawings
 
 
@@ -158,18 +155,6 @@ def run_claims(
         'claims': [claim.as_dict() for claim in judge(result)],
         'cases': [{**name._asdict(), **measured} for name, measured in result.items()],
     }
-
-
-def claims_csv(result: dict[str, Any]) -> str:
-    """Return the table with a row for every claim."""
-    keys = ('claim', 'statement', 'where', 'verdict', 'held', 'cases', 'reason')
-    return csv_text(keys, ([claim[key] for key in keys] for claim in result['claims']))
-
-
-def cases_csv(result: dict[str, Any]) -> str:
-    """Return every measurement of every case."""
-    keys = list(result['cases'][0])
-    return csv_text(keys, ([case.get(key, '') for key in keys] for case in result['cases']))
 
 
 def claims_markdown(result: dict[str, Any]) -> str:

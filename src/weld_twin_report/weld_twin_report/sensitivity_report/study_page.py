@@ -69,9 +69,10 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
     rows = sorted(indices['indices'], key=lambda row: -row['ST'])
     settled = 'converged' if indices['converged'] else 'not converged yet'
     first, *others = advised(study['local']['parameters'], _ADVISED)
+    gain = millimetres(first.gain_m)
     return section(
         'Which tolerance to tighten',
-        tag('p.second', _first(first)),
+        tag('p.second', f'{capital(first.instruction)} first: to {first.wanted}, gains {gain}.'),
         _advised([first, *others]),
         tag('h3', f'What drives the largest deviation, {motion} motion'),
         _bars(rows[:_SHOWN]),
@@ -87,11 +88,6 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
         ),
         id_='answer',
     )
-
-
-def _first(advice: Advice) -> str:
-    gain = millimetres(advice.gain_m)
-    return f'{capital(advice.instruction)} first: to {advice.wanted}, gains {gain}.'
 
 
 def _advised(rows: Sequence[Advice]) -> Html:

@@ -46,7 +46,7 @@ def info(given: Given) -> int:
 
 
 def _sentences(result: BagInfo) -> list[str]:
-    from weld_twin_msgs_py.bags.ends import COMPLETENESS
+    from weld_twin_msgs_py.bags.needed import COMPLETENESS
 
     out = [f'missing: {text}' for text in result.missing]
     out += [f'note: {text}' for text in result.notes]

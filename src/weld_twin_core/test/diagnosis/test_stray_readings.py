@@ -36,6 +36,14 @@ def test_four_wild_readings_of_sixty_leave_every_quoted_figure():
     assert np.flatnonzero(~good[1]).tolist() == [3, 20, 21, 58]
 
 
+def test_readings_left_out_before_never_count_however_many_stray_beside_them():
+    """They have no weight to be divided by: the RMS of all would be no number."""
+    weights = wild(slice(10, 20))
+    weights[[3, 30, 40]] = 0.0
+    good = trusted([weights])[0]
+    assert not good[[3, 30, 40]].any() and good.sum() > 40
+
+
 @pytest.mark.parametrize(
     'weights',
     [

@@ -303,13 +303,14 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
 
     All but outliers, and of those no more than `SET_ASIDE` (or a few) are left out, the farthest:
     what many samples do is structure, and must show in what is left. Strays, each by itself and
-    farther off than any structure, are left out all the same: one would be the whole RMS.
+    farther off than any structure, are left out all the same: one would be the whole RMS. So are
+    those without any weight, which were left out before.
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
     far = sum(int(part.sum()) for part in strays(weights, (HUBER / STRAY) ** 2))
     aside = max(few, int(SET_ASIDE * every.size), far)
     least = float(np.sort(every)[aside]) if every.size > aside else 0.0
-    return [weight >= min(TRUSTED, least) for weight in weights]
+    return [(weight > 0.0) & (weight >= min(TRUSTED, least)) for weight in weights]
 
 
 def strays(weights: Sequence[Array], least: float = TRUSTED) -> list[NDArray[np.bool_]]:

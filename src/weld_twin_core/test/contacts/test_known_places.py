@@ -3,6 +3,7 @@
 """A block whose size or place is known, felt with the wire: then the base shows."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.contacts import Artefact, Contacts, lengths, places
+from weld_twin_core.diagnosis.answer.contact_spreads import _base_hidden
 from weld_twin_core.diagnosis.frames.aligned import aligned, other_causes
 from weld_twin_core.diagnosis.predicting.allowed import left_open
 from weld_twin_core.errors import DataError
@@ -78,6 +80,10 @@ def test_the_same_block_at_an_unknown_place_says_nothing_of_the_base(robot):
     assert problem.align == frozenset()
     open_ = left_open(problem, model)
     assert open_[:3] == ('base x', 'base y', 'base z') and len(open_) == 6
+    fitted = SimpleNamespace(
+        problem=problem, final=SimpleNamespace(model=model), scale=problem.unit_scale()
+    )
+    assert _base_hidden(fitted) == ('where the base stands',)
 
 
 def test_a_base_that_is_not_known_is_found_beside_the_cause(robot):

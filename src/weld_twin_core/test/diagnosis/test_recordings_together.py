@@ -69,6 +69,14 @@ def test_waves_of_a_joint_are_looked_for_though_another_recording_moved_it_more_
     assert any(e.name == 'transmission_ripple' and e.site == ELBOW for e in found)
 
 
+@pytest.mark.parametrize('rate', [2.0, 5.0])
+def test_waves_of_all_joints_take_no_more_than_half_of_what_was_measured(rate):
+    problem, model = together(swing(12.0, elbow=1.2, rate=rate))
+    waved = [e for e in _everything(problem, model, (), Beliefs()) if e.search.orders().size]
+    assert len(waved) == 3
+    assert 0 < sum(2 * e.search.orders().size for e in waved) <= problem.size / 2
+
+
 @pytest.mark.parametrize('seconds', [0.02, 0.1, 0.16])
 def test_a_recording_of_a_few_samples_takes_no_place_of_a_fault_from_the_others(seconds):
     assert groups(swing(20.0), swing(seconds)) >= groups(swing(20.0))

@@ -54,13 +54,14 @@ TESTS = {
     'structural_aliases noise_and_interval learned_priors levels changes springs_at_rest',
     'result': 'contributions',
     'evidence': 'evidence decision',
-    'hypotheses': 'impossible_effects swapped_alternatives carrying needed_kinds unseen_stretches',
+    'hypotheses': 'impossible_effects swapped_alternatives carrying needed_kinds unseen_stretches '
+    'recordings_together',
     'frames': 'alignment changes known_places touches steps_by_hand',
     'soundness': 'alignment checks_by_hand mends mixups_by_hand soundness trials steps_by_hand bundle '
     'touch_mistakes tracker_beside',
     'unseen': 'unseen_stretches chance folds levels noise_and_interval steps_by_hand '
-    'touch_mistakes touches known_places fit many_small_errors',
-    'many': 'many_small_errors small_errors learned_priors needed_kinds',
+    'touch_mistakes touches known_places fit many_small_errors recordings_together',
+    'many': 'many_small_errors small_errors learned_priors needed_kinds recordings_together',
     'verdict': 'decision',
     'levels': 'levels unseen_stretches',
     'calibration': 'calibration formulas',

@@ -77,6 +77,14 @@ def test_waves_of_all_joints_take_no_more_than_half_of_what_was_measured(rate):
     assert 0 < sum(2 * e.search.orders().size for e in waved) <= problem.size / 2
 
 
+def test_a_frame_without_a_formula_is_off_in_six_ways():
+    problem, model = together(swing(10.0))
+    every = list(all_groups(problem, model, problem.unit_scale()))
+    for frame in ('base', 'tool'):
+        (own,) = [group for group in every if (group.at, group.on) == (frame, 'constant')]
+        assert len(own.columns) == 6
+
+
 @pytest.mark.parametrize('seconds', [0.02, 0.1, 0.16])
 def test_a_recording_of_a_few_samples_takes_no_place_of_a_fault_from_the_others(seconds):
     assert groups(swing(20.0), swing(seconds)) >= groups(swing(20.0))

@@ -427,6 +427,61 @@ def test_what_a_routine_sets_holds_after_its_call(language, text, reason):
     assert (move.kind == 'unknown') == bool(reason) and reason in move.why
 
 
+RAPID_CALLS = RAPID_SEAM.partition('PROC sub')[0] + 'ENDMODULE\n'
+RAPID_OTHER = 'MODULE n\nPROC {}()\n{}ENDPROC\nENDMODULE\n'
+RAPID_TOOL = RAPID_CALLS.replace(
+    'PROC main',
+    'PERS tooldata t:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\nPROC main',
+).replace('tool0', 't')
+KRL_CALLS = f'DEF a()\n{KRL_LONG}sub()\n{KRL_SEAM}END\n'
+
+
+@pytest.mark.parametrize(
+    ('language', 'text', 'others', 'known'),
+    [
+        ('krl', KRL_CALLS, [KRL_SETS], False),
+        (
+            'krl',
+            KRL_CALLS,
+            [KRL_SETS.partition('DEF other')[0], f'DEF other()\n{KRL_SHORT}END\n'],
+            False,
+        ),
+        ('krl', KRL_CALLS, ['DEF sub()\nEND\n', f'DEF other()\n{KRL_SHORT}END\n'], True),
+        ('krl', KRL_CALLS + 'DEF sub()\nEND\n', [KRL_SETS], True),
+        ('rapid', RAPID_CALLS, [RAPID_OTHER.format('sub', 'PDispSet x;\n')], False),
+        ('rapid', RAPID_CALLS, [RAPID_OTHER.format('x', 'PDispSet x;\n')], True),
+        ('rapid', RAPID_TOOL, [RAPID_OTHER.format('sub', 't.tframe.trans.z := 5;\n')], False),
+        ('rapid', RAPID_TOOL, [RAPID_OTHER.format('sub', '')], True),
+        ('fanuc-ls', ['CALL SUB', 'L P[1] 9mm/sec FINE'], ['Touch Offset PR[1]'], False),
+        ('fanuc-ls', ['CALL SUB', 'L P[1] 9mm/sec FINE'], ['UTOOL[1]=PR[3]'], False),
+        (
+            'fanuc-ls',
+            ['CALL SUB', 'L P[1] 9mm/sec FINE'],
+            ['Touch Offset PR[1]', 'Touch Offset End'],
+            True,
+        ),
+        ('inform', ['CALL JOB:SUB', 'MOVL C00001 V=9.0'], ['SFTON P001'], False),
+        ('inform', ['CALL JOB:SUB', 'MOVL C00001 V=9.0'], ['SETTOOL TL#(1) P003'], False),
+        ('inform', ['CALL JOB:SUB-2', 'MOVL C00001 V=9.0'], ['SFTON P001'], True),
+    ],
+)
+def test_what_a_routine_of_another_file_sets_holds_after_its_call(language, text, others, known):
+    if isinstance(text, list):
+        head, form, tail = {
+            'fanuc-ls': ('/PROG {}\n/MN\n', '   1:{} ;\n', TP_TAIL),
+            'inform': (JOB_HEAD.replace('NAME A', 'NAME {}'), '{}\n', 'END\n'),
+        }[language]
+        text, *others = (
+            head.format(name) + ''.join(map(form.format, lines)) + tail
+            for name, lines in (('A', text), ('SUB', others))
+        )
+    robot = PROGRAMS[language][0]
+    beside = tuple(Source(f'other{k}', other) for k, other in enumerate(others))
+    own = context(robot, language)._replace(beside=beside)
+    step = read_sources([Source('file', text)], own, language).steps[-1]
+    assert bool(step.tool.why or step.shift.why) != known
+
+
 ABB_MOVE, ABB_ON, ABB_OFF = 'MoveL p1,v100,fine,tool0;', 'PDispSet x;', 'PDispOff;'
 TP_MOVE, TP_ON, TP_OFF = 'L P[1] 9mm/sec FINE', 'Touch Offset PR[1]', 'Touch Offset End'
 JOB_MOVE, JOB_ON, JOB_OFF = 'MOVL C00001 V=9.0', 'SFTON P001', 'SFTOF'

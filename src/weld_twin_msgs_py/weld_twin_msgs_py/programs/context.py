@@ -15,7 +15,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Counted
 
 from .controllers import Controller, shown_order
-from .source import Notation, Number, joint_notation
+from .source import Notation, Number, Source, joint_notation
 
 
 class Context(NamedTuple):
@@ -27,6 +27,8 @@ class Context(NamedTuple):
     """Of a Yaskawa arm whose points are in pulses, shape (n,)."""
     counted: Counted | None = None
     """How the controller counts the joints, where a recording of it tells."""
+    beside: tuple[Source, ...] = ()
+    """Other programs of its folder, whose routines it may call."""
 
     @property
     def axes(self) -> int:

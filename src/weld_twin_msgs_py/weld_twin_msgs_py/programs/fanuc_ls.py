@@ -31,6 +31,7 @@ from .reader import LEAST_SPEED, Reader
 from .source import FANUC_POSE, NUMBER, Notation, Number, Source, closing
 
 POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')
+_NAMED = re.compile(r'^/PROG[ \t]+([\w-]+)', re.M)
 _PART = re.compile(r'^/(MN|POS|END)\b', re.M)
 _POINT = re.compile(r'^[ \t]*P\[\s*(\d+)\s*(?::[^\]\r\n]*)?\]\s*(\{)', re.M)
 _STATEMENT = re.compile(r'^[ \t]*(\d*)[ \t]*:[ \t]*([^;]*);', re.M)
@@ -57,7 +58,7 @@ SPEED = 0.1
 class FanucReader(Reader):
     """Goes through a program once."""
 
-    comments = (r'"[^"\r\n]*"',)
+    comments, routine, call = (r'"[^"\r\n]*"',), _NAMED, r'\bCALL[ \t]+({})(?![\w-])'
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         super().__init__(sources, context)
@@ -72,8 +73,8 @@ class FanucReader(Reader):
         self.numbered_set(_FRAME_SET)
         for result in _POINT.finditer(self.text, points):
             self._point(result)
-        for result in _STATEMENT.finditer(self.text, moves, points):
-            self._statement(result)
+        calls = self.calls(self.routines_named(), _displaces)
+        self.in_order({_STATEMENT: self._statement}, moves, points, [(self.displacing, calls)])
         self._refuse_open(moves, points)
         self.shift_all(_TRACKING, 'it goes along with the conveyor of {}')
         return self.program
@@ -233,6 +234,11 @@ class FanucReader(Reader):
         if name == 'P' and result is not None and int(result[1]) in self.untaught:
             return self.untaught[int(result[1])]
         return f'{name}[{index}] is not given here'
+
+
+def _displaces(text: str) -> bool:
+    """Return whether points are displaced after a program, by its text."""
+    return any(not end for end in _DISPLACING.findall(text)[-1:])
 
 
 def _speed(kind: Kind, tail: str) -> float:

@@ -32,6 +32,7 @@ from .controllers import Frame
 from .reader import LEAST_SPEED, Handler, Reader
 from .source import YASKAWA_POSE, Notation, Number, Source
 
+_NAMED = re.compile(r'^//NAME[ \t]+([^\r\n]*\S)', re.M)
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
 _MOVE = re.compile(r'^[ \t]*(\+?[A-Z]*MOV[A-Z]*)\b[ \t]*([^\r\n]*)', re.M)
@@ -58,7 +59,7 @@ CM_PER_MIN = 0.01 / 60.0
 class InformReader(Reader):
     """Goes through a job once."""
 
-    comments = (r"'[^\r\n]*",)
+    comments, routine, call = (r"'[^\r\n]*",), _NAMED, r'\bCALL[ \t]+JOB:({})(?![\w-])'
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         super().__init__(sources, context)
@@ -80,7 +81,9 @@ class InformReader(Reader):
             _TIMER: self._timer,
             _BLOCK: self._block,
         }
-        self.in_order(found | ({_LABEL: self._label} if 'SFTON' in self.text else {}), cut)
+        calls = self.calls(self.routines_named(), _displaces)
+        labels = {_LABEL: self._label} if calls or 'SFTON' in self.text else {}
+        self.in_order(found | labels, cut, more=[(self.displacing, calls)])
         self._close_arc()
         return self.program
 
@@ -204,6 +207,11 @@ class InformReader(Reader):
             astray=flags_kept(kind, self.program.points[point], FLAGS),
             shift=self.shift,
         )
+
+
+def _displaces(text: str) -> bool:
+    """Return whether points are displaced after a job, by its text."""
+    return text.rfind('SFTON') > text.rfind('SFTOF')
 
 
 def _speed(kind: Kind, rest: str) -> float:

@@ -131,7 +131,7 @@ class _State:
 class KrlReader(Reader):
     """Goes through the files once: the .src, then the .dat where there is one."""
 
-    comments = (r';[^\r\n]*', r'"[^"\r\n]*"')
+    comments, routine, call = (r';[^\r\n]*', r'"[^"\r\n]*"'), _NAMED, _CALL
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         super().__init__(sources, context)
@@ -157,11 +157,9 @@ class KrlReader(Reader):
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)
         self._frame_tables()
-        routines = self.routines_of(_NAMED)
+        routines = self.routines_named()
         labels = self.labels()
-        tool, base = (
-            [*labels, *self.calls(routines, sets.search, _CALL)] for sets in _SETS.values()
-        )
+        tool, base = ([*labels, *self.calls(routines, sets.search)] for sets in _SETS.values())
         self.in_order(
             {
                 _MOVE: self._move,
@@ -178,6 +176,9 @@ class KrlReader(Reader):
                 (lambda _: setattr(self.state, 'base', OTHER_BASE), base),
             ],
         )
+        for text in (text for _, text in self.called):
+            self.tools += [OTHER_TOOL] if _SETS['TOOL'].search(text) else []
+            self.bases += [OTHER_BASE] if _SETS['BASE'].search(text) else []
         self.settle('tool', OTHER_TOOL, self.tools)
         self.settle('base', OTHER_BASE, self.bases)
         self.shift_all(_ROOT_SET, 'what bases count from is set at {}')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -144,6 +145,16 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
             )
         beside += [read_source(other) for other in result]
     return read_sources([source, *beside], context, name)
+
+
+def programs_beside(path: Path | str, name: str) -> tuple[Source, ...]:
+    """Return the other programs of a folder in a language of the table that can be read."""
+    out = []
+    for other in sorted(Path(path).parent.iterdir()):
+        if other.suffix.lower() in LANGUAGES[name].extensions and other.name != Path(path).name:
+            with suppress(DataError):
+                out.append(read_source(other))
+    return tuple(out)
 
 
 def _refuse_cut(source: Source, language: Language) -> None:

@@ -116,7 +116,7 @@ Tree = Leaf | list['Tree']
 class RapidReader(Reader):
     """Goes through a module once."""
 
-    comments = (r'"[^"\r\n]*"', r'![^\r\n]*')
+    comments, routine, call = (r'"[^"\r\n]*"', r'![^\r\n]*'), _ROUTINE, _CALLED
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         super().__init__(sources, context)
@@ -133,11 +133,11 @@ class RapidReader(Reader):
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
-        routines = self.routines_of(_ROUTINE)
-        self._set_by_calls({name.lower(): self.text[slice(*span)] for name, span in routines})
+        routines = self.routines_named()
+        self._set_by_calls({name.lower(): text for name, text in routines})
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
-        called = self.calls(routines, lambda _: True, _CALLED)
+        called = self.calls(routines, lambda _: True)
         self.entered = {call[1].lower(): (Frame(call[1]), []) for call in called}
         labels = self.labels() if re.search('|'.join(_DISPLACED), self.text, re.I) else []
         self.in_order(
@@ -152,7 +152,7 @@ class RapidReader(Reader):
             },
             more=[
                 (lambda call: self.entered[call[1].lower()][1].append(self.shift), called),
-                (self._displacing, self.calls(routines, _displaces, _CALLED)),
+                (self.displacing, self.calls(routines, _displaces)),
                 (lambda label: setattr(self, 'shift', unclear_shift(self.where(label))), labels),
             ],
         )
@@ -301,9 +301,6 @@ class RapidReader(Reader):
             self.shift = Frame('', why=f'{result[1]} at {where} displaces it')
         else:
             self.unknown('linear', result, f'{result[1]} is not understood')
-
-    def _displacing(self, result: re.Match[str]) -> None:
-        self.shift = Frame('', why=f'{result[1]}, called at {self.where(result, 1)}, displaces it')
 
     def _routine(self, result: re.Match[str]) -> None:
         self.new_piece(result)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -36,6 +36,10 @@ class Reader(ABC):
 
     comments: ClassVar[tuple[str, ...]]
     """Regular expressions of what is blanked out: comments and strings."""
+    routine: ClassVar[re.Pattern[str]] = re.compile(r'(?!)')
+    """Head of a routine that other files may call, its name the first group."""
+    call: ClassVar[str] = ''
+    """Pattern of its call, with {} for the name."""
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         self.sources, self.context = list(sources), context
@@ -49,6 +53,9 @@ class Reader(ABC):
         self.routines = 0
         self.positioner = ''
         """The external kinematic system that bases go along with."""
+        self.own = {head[1].lower() for head in self.routine.finditer(self.text)}
+        self.called = self._called()
+        """Other files with routines that this one calls, or that those call, and their texts."""
 
     @abstractmethod
     def read(self) -> Program:
@@ -72,21 +79,43 @@ class Reader(ABC):
         for _, handle, match in sorted(matches, key=lambda each: each[0]):
             handle(match)
 
-    def routines_of(self, named: re.Pattern[str]) -> list[tuple[str, Span]]:
-        """Return the names of routines, of a pattern's first group, and where their statements stand."""
-        heads = list(named.finditer(self.text))
-        ends = [*(head.start() for head in heads[1:]), len(self.text)]
-        return [(head[1], (head.end(), end)) for head, end in zip(heads, ends, strict=False)]
+    def _called(self) -> list[tuple[Source, str]]:
+        rest = [(source, masked(source.text, self.comments)) for source in self.context.beside]
+        out, callers = list[tuple[Source, str]](), [self.text]
+        for caller in callers:  # grows by those that are called
+            for each in list(rest):
+                names = {head[1].lower() for head in self.routine.finditer(each[1])} - self.own
+                if names and self._call_of(names).search(caller):
+                    rest.remove(each)
+                    out.append(each)
+                    callers.append(each[1])
+        return out
+
+    def _call_of(self, names: Iterable[str]) -> re.Pattern[str]:
+        listed = '|'.join(map(re.escape, sorted(names)))
+        return re.compile(self.call.replace('{}', f'(?:{listed})'), re.I | re.M)
+
+    def routines_named(self) -> list[tuple[str, str]]:
+        """Return names and statements of the routines here, and of others in the files they call."""
+        out = list[tuple[str, str]]()
+        for text in (self.text, *(text for _, text in self.called)):
+            heads = list(self.routine.finditer(text))
+            ends = [*(head.start() for head in heads[1:]), len(text)]
+            out += [
+                (head[1], text[head.end() : end])
+                for head, end in zip(heads, ends, strict=False)
+                if text is self.text or head[1].lower() not in self.own
+            ]
+        return out
 
     def calls(
-        self, routines: Sequence[tuple[str, Span]], does: Callable[[str], object], call: str
+        self, routines: Sequence[tuple[str, str]], does: Callable[[str], object]
     ) -> list[re.Match[str]]:
-        """Return calls, a pattern with {}, of routines that do something or call one that does."""
-        names = {name.lower() for name, span in routines if does(self.text[slice(*span)])}
+        """Return calls of routines that do something or call one that does."""
+        names = {name.lower() for name, text in routines if does(text)}
         while names:
-            listed = '|'.join(map(re.escape, sorted(names)))
-            pattern = re.compile(call.replace('{}', f'(?:{listed})'), re.I | re.M)
-            more = {name.lower() for name, span in routines if pattern.search(self.text, *span)}
+            pattern = self._call_of(names)
+            more = {name.lower() for name, text in routines if pattern.search(text)}
             if more <= names:
                 return list(pattern.finditer(self.text))
             names |= more
@@ -119,17 +148,25 @@ class Reader(ABC):
                 for name in re.findall(r'\w+', head[1]):
                     name = name.lower() if pattern.flags & re.IGNORECASE else name
                     out.setdefault(name, source.where(head.start()))
+        for source, text in self.called:
+            for match in pattern.finditer(text):
+                out.setdefault(re.sub(r'\s', '', match[1]).lower(), source.where(match.start(1)))
         return out
 
     def numbered_set(self, pattern: re.Pattern[str]) -> None:
         """Take in where a frame of a table (first group) and number (second), or of any, is set."""
-        for match in pattern.finditer(self.text):
-            self.again.setdefault(match[1] + match[2], self.where(match))
+        for source, text in [(self.source, self.text), *self.called]:
+            for match in pattern.finditer(text):
+                self.again.setdefault(match[1] + match[2], source.where(match.start()))
 
     def numbered(self, table: str, index: str) -> Frame:
         """Return a frame of a table; one that the program sets is not what the table holds."""
         where = self.again.get(table + index, self.again.get(table, ''))
         return Frame(index, why=where and f'the numbers of {table} {index} are set at {where}')
+
+    def displacing(self, match: re.Match[str]) -> None:
+        """Let a call, with the routine's name as its first group, displace what follows it."""
+        self.shift = Frame('', why=f'{match[1]}, called at {self.where(match, 1)}, displaces it')
 
     def where(self, match: re.Match[str], group: int = 0) -> str:
         """Return file and line of what was found."""

@@ -30,7 +30,7 @@ from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .context import Context
 from .controllers import Frame
-from .reader import LEAST_SPEED, Reader, Span
+from .reader import LEAST_SPEED, Reader
 from .source import UR_POSE, Notation, Number, Source, closing, stripped
 
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
@@ -71,7 +71,7 @@ _ASSIGNED = re.compile(
 class UrscriptReader(Reader):
     """Goes through a script once."""
 
-    comments = (r'#[^\r\n]*', r'"[^"\r\n]*"')
+    comments, call = (r'#[^\r\n]*', r'"[^"\r\n]*"'), _CALL
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
         super().__init__(sources, context)
@@ -86,8 +86,8 @@ class UrscriptReader(Reader):
 
     def read(self) -> Program:
         routines = self._routines()
-        tools = self.calls(routines, lambda text: 'set_tcp' in text, _CALL)
-        shifts = self.calls(routines, _displaces, _CALL)
+        tools = self.calls(routines, lambda text: 'set_tcp' in text)
+        shifts = self.calls(routines, _displaces)
         self._declare()
         self.in_order(
             {_WORD: self._word},
@@ -123,9 +123,9 @@ class UrscriptReader(Reader):
             words = result.groups()[6:9]
             self.tool, self.shift = self.blocks.follow(self.where(result), words, held)
 
-    def _routines(self) -> list[tuple[str, Span]]:
+    def _routines(self) -> list[tuple[str, str]]:
         """Return names and statements of the routines; of one that holds others, all of it."""
-        out, begun = list[tuple[str, Span]](), list[re.Match[str] | None]()
+        out, begun = list[tuple[str, str]](), list[re.Match[str] | None]()
         for result in _WORD.finditer(self.text):
             if result[6]:
                 begun.append(_NAME.match(self.text, result.end()))
@@ -137,7 +137,7 @@ class UrscriptReader(Reader):
                     'write a switch as if and elif'
                 )
             elif result[9] and (head := begun.pop()) is not None:
-                out.append((head[1], (head.end(), result.start())))
+                out.append((head[1], self.text[head.end() : result.start()]))
         if begun:
             where = self.source.where(len(self.text.rstrip()) - 1)
             raise DataError(f"{where}: an 'end' is missing; is the file cut off?")

@@ -11,7 +11,7 @@ from weld_twin_core.twin.program_correction import Caps
 from weld_twin_msgs_py.bags import provenance
 from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
-from weld_twin_msgs_py.programs.languages import corrected_twice, language_of
+from weld_twin_msgs_py.programs.languages import corrected_twice, language_of, programs_beside
 from weld_twin_msgs_py.programs.source import read_source
 from weld_twin_nodes.cli.given import Given, changed_robot, inputs_of, quantity, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
@@ -94,6 +94,7 @@ def _corrected_program(given: Given) -> int:
     robot = given.load_robot()
     language = language_of(read_source(given.program), given.program, given.controller)
     context = given.program_context(robot, language, given.model)
+    context = context._replace(beside=programs_beside(given.program, language))
     program = read_program(given.program, context, language)
     if given.model:
         return _by_model(given, context, program)

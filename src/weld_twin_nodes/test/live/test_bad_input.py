@@ -232,13 +232,18 @@ def test_a_diagnosis_can_be_the_model_of_the_twin(cell, robot, tmp_path):
     bench.close()
 
 
-def test_that_a_model_had_its_joints_as_the_controller_shows_them_is_told(cell, robot, tmp_path):
+def test_that_a_model_had_other_joints_or_another_robot_file_is_told(cell, robot, tmp_path):
     file = tmp_path / 'diagnosis.json'
     model = {
         'tool': robot.T_flange_tool.tolist(),
         'bases': [np.eye(4).tolist()],
         'counted': Counted(np.tri(6), np.zeros(6)).as_mapping(),
     }
-    file.write_text(json.dumps({'schema': 'weld_twin/diagnosis/1', 'model': model}))
-    node = cell.start('forward_kinematics_twin', robot='ur5', model=str(file))
+    arm = tmp_path / 'robot.yaml'
+    arm.write_text(json.dumps(robot.to_mapping()))
+    inputs = [{'use': 'robot', 'sha256': 'as it was'}]
+    content = {'schema': 'weld_twin/diagnosis/1', 'model': model, 'inputs': inputs}
+    file.write_text(json.dumps(content))
+    node = cell.start('forward_kinematics_twin', robot=str(arm), model=str(file))
     cell.wait(lambda: 'joints as the controller shows them' in node.log, 'a sentence')
+    assert 'is not as it was when the diagnosis was made' in node.log

@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import fields, replace
 from pathlib import Path
@@ -303,18 +303,6 @@ def inputs_of(**files: str | Sequence[str]) -> list[InputFile]:
     ]
 
 
-def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
-    """Return that a robot file is another than at a diagnosis, which looks at its joints alone."""
-    was = [each['sha256'] for each in content.get('inputs') or () if each.get('use') == 'robot']
-    now = [item.sha256 for item in inputs_of(robot=path)]
-    if not was or not now or now == was:
-        return []
-    return [
-        f"the robot file '{path}' is not as it was when the diagnosis was made; masses, frames and "
-        'limits count as they are now'
-    ]
-
-
 def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
     """Return the robot with the effects of a file; say which values no machine has."""
     from ..offline.given_twin import build_twin
@@ -325,11 +313,11 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
     return twin
 
 
-def say_doubts(robot: Robot, effects: Sequence[Effect], path: str) -> None:
-    """Say on stderr what in a model may be a slip of its file."""
-    from ..offline.given_twin import doubts
+def say_doubts(robot: Robot, effects: Sequence[Effect], path: str, robot_file: str = '') -> None:
+    """Say on stderr what in a model may be a slip of its file, and that the robot's was changed."""
+    from ..offline.given_twin import changed_robot, diagnosis_of, doubts
 
-    for doubt in doubts(robot, effects):
+    for doubt in changed_robot(diagnosis_of(path), robot_file) + doubts(robot, effects):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
 
 

@@ -29,7 +29,7 @@ from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from ..offline.given_twin import diagnosis_of, doubts
+from ..offline.given_twin import changed_robot, diagnosis_of, doubts
 from .cell_node import CellNode
 from .settings import NO_NUMBERS, Setting
 from .tf_frames import Frames, frames_of
@@ -141,10 +141,11 @@ def place_twin(node: CellNode, twin: Twin) -> Twin:
 
 def say_doubts(node: CellNode, robot: Robot, effects: Sequence[Effect]) -> None:
     """Warn of all in the node's model that may be a slip, and of joints that it was told otherwise."""
-    for doubt in doubts(robot, effects):
-        node.warn(doubt, doubt)
     path = node.setting('model')
-    if path and (diagnosis_of(path).get('model') or {}).get('counted') is not None:
+    content = diagnosis_of(path)
+    for doubt in changed_robot(content, node.setting('robot')) + doubts(robot, effects):
+        node.warn(doubt, doubt)
+    if (content.get('model') or {}).get('counted') is not None:
         sentence = (
             f"the recordings of '{path}' have joints as the controller shows them, which are not "
             'those of the robot file; this node takes joints as the robot file has them'

@@ -21,6 +21,7 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
+from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.yaml_file import parse_yaml, read_yaml
 
 IMPOSSIBLE = 10.0
@@ -90,6 +91,17 @@ def other_readings(content: Mapping[str, Any]) -> str:
         if isinstance(mend, dict) and mend.get('do') == 'joints':
             return f'{item.get("sentence")} {item.get("remedy")}, then diagnose again'
     return ''
+
+
+def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
+    """Return that a robot file is another than at a diagnosis, which looks at its joints alone."""
+    was = [each['sha256'] for each in content.get('inputs') or () if each.get('use') == 'robot']
+    if not was or not Path(path).is_file() or [hashed('robot', path).sha256] == was:
+        return []
+    return [
+        f"the robot file '{path}' is not as it was when the diagnosis was made; masses, frames and "
+        'limits count as they are now'
+    ]
 
 
 def doubts(robot: Robot, effects: Sequence[Effect]) -> list[str]:

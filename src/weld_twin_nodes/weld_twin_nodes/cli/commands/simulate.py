@@ -77,7 +77,7 @@ def _predict(given: Given) -> int:
     recording = prediction.on_one_clock(recording if model.source is None else model.source)
     if model.remark:
         print(f'note: {model.remark}')
-    say_doubts(model.twin.robot, model.twin.effects, given.model)
+    say_doubts(model.twin.robot, model.twin.effects, given.model, given.robot)
     got = prediction.write_prediction(
         given.out, model, recording, storage=given.storage, provenance={'model': given.model}
     )

@@ -13,10 +13,10 @@ from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
 from weld_twin_msgs_py.programs.languages import corrected_twice, language_of, programs_beside
 from weld_twin_msgs_py.programs.source import read_source
-from weld_twin_nodes.cli.given import Given, changed_robot, inputs_of, quantity, say_doubts
+from weld_twin_nodes.cli.given import Given, inputs_of, quantity, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
-from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
+from weld_twin_nodes.offline.given_twin import changed_robot, diagnosis_of, other_readings
 
 from . import OF_PROGRAM
 
@@ -69,7 +69,7 @@ def _corrected_bag(given: Given) -> int:
     robot.refuse_positioner('a compensated motion')
     recording = given.read_bag(given.program, robot)
     made = prediction.compensated(robot, given.model, recording)
-    say_doubts(robot, made.model.twin.effects, given.model)
+    say_doubts(robot, made.model.twin.effects, given.model, given.robot)
     if made.remark:
         print(f'note: {made.remark}')
     robot.check_positions(made.result.motion.q)

@@ -71,6 +71,8 @@ def test_a_recording_survives_the_bag_its_single_file_and_the_loss_of_metadata(
     back = read_recording(bag, robot)
     assert_same(back, recording)
     assert (back.name, back.notes) == ('mine.bag', ())
+    (note,) = read_recording(bag, replace(robot, name='other')).notes
+    assert f"of robot '{robot.name}', and 'other' was given" in note
     (file,) = (path for path in bag.iterdir() if path.suffix != '.yaml')
     alone = shutil.copy(file, tmp_path / f'alone{file.suffix}')
     (bag / 'metadata.yaml').unlink()

@@ -173,7 +173,7 @@ def read_recording(
         wrench_frame=intake.wrench_frame.meaning,
         static=bool(made['static']) if 'static' in made else None,
         one_clock=one_clock,
-        notes=_notes(names, streams, intake, bool(points)),
+        notes=_of_another(made, robot) + _notes(names, streams, intake, bool(points)),
     )
     whole = _counted(whole, made)
     if touched:
@@ -323,6 +323,17 @@ def _take(message: Any, role: Role, stream: Stream, intake: Intake) -> None:
         raise stream.jumped(last - taken.stamp)
     stream.frames.add(message.header.frame_id)
     stream.append(taken.stamp, taken.row)
+
+
+def _of_another(made: Mapping[str, Any], robot: Robot) -> tuple[str, ...]:
+    """Return that a bag was made with a robot of another name, where it says so."""
+    told = made.get('robot')
+    name = told.get('name', robot.name) if isinstance(told, dict) else robot.name
+    if name == robot.name:
+        return ()
+    return (
+        f'the bag says that it is of robot {name!r}, and {robot.name!r} was given: check which',
+    )
 
 
 def _notes(

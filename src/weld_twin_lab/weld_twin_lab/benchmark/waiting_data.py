@@ -169,8 +169,6 @@ def _table(place: Path) -> None:
 def _plant(place: Path) -> None:
     from weld_twin_report.history import Database
 
-    from .waiting_data import fill
-
     place.mkdir()
     database = Database(str(place / 'plant.db'))
     fill(database, *PLANT)

@@ -134,8 +134,6 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
         return _PROGRAM
     if isinstance(effect, RootPose) and robot is not None:
         # Programs bring the planning of motions: a second that an arm on a floor need not wait.
-
-        # Programs bring the planning of motions: a second that an arm on a floor need not wait.
         from .root_frame import old_and_new
 
         return f'{place} {old_and_new(effect, str(brand), robot)} {UNCHECKED}'

@@ -129,6 +129,4 @@ def _listening(settings: Settings) -> socket.socket:
 def _live(settings: Settings) -> Callable[[], dict[str, str] | None]:
     if not settings.live:
         return lambda: None
-    from .running import LiveVerdict
-
     return LiveVerdict().last

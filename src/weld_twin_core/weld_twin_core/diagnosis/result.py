@@ -182,6 +182,11 @@ class Family:
     joined: tuple[str, ...] = ()
     """Other kinds that it is one set with: one of them is likelier right than wrong, and none alone."""
 
+    @property
+    def kinds(self) -> int:
+        """Return how many kinds it stands for."""
+        return 1 + len(self.joined)
+
     def group(self, site: Site) -> tuple[Site, ...]:
         """Return the members that are the same error as one everywhere, itself included."""
         return next((group for group in self.alike if site in group), (site,))

@@ -375,10 +375,7 @@ def _nested_listing(folder: Path) -> Path:
 def _packed_file(folder: Path) -> Path:
     bag, text = _sample(folder)
     _file('bag.mcap.zstd', _zeros('zstd') * 3, bag)
-    text = text.replace('- bag.mcap', '- bag.mcap.zstd')
-    text = text.replace("compression_mode: ''", 'compression_mode: file')
-    _file('metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'), bag)
-    return bag
+    return _said_packed(bag, text.replace('- bag.mcap', '- bag.mcap.zstd'), 'file')
 
 
 def _packed_message(folder: Path) -> Path:
@@ -386,7 +383,12 @@ def _packed_message(folder: Path) -> Path:
     with closing(sqlite3.connect(bag / 'bag.db3')) as base, base:
         base.execute('UPDATE messages SET data = ?', (_zeros('zstd'),))
     text = text.replace('- bag.mcap', '- bag.db3').replace(': mcap', ': sqlite3')
-    text = text.replace("compression_mode: ''", 'compression_mode: message')
+    return _said_packed(bag, text, 'message')
+
+
+def _said_packed(bag: Path, text: str, mode: str) -> Path:
+    """Write the metadata of a bag that was packed by file or by message."""
+    text = text.replace("compression_mode: ''", f'compression_mode: {mode}')
     _file('metadata.yaml', text.replace("compression_format: ''", 'compression_format: zstd'), bag)
     return bag
 

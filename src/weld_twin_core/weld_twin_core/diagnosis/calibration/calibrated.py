@@ -65,17 +65,18 @@ class Stated:
     def believed(self, family: Family, kinds: int) -> float:
         """Return how probable it is that a kind of many small errors is right, of so many named."""
         names = len(family.needed) + len(family.like)
-        features = {**self.situation, **of_kind(family, names, kinds, *self.errors)}
-        return usual_calibration().probability('name of many', features)
+        return usual_calibration().probability('name of many', self.of_kind(family, names, kinds))
+
+    def of_kind(self, family: Family, names: int, kinds: int) -> Numbers:
+        """Return the features of a kind with so many names in its set, of so many kinds named."""
+        return {**self.situation, **of_kind(family, names, kinds, *self.errors)}
 
 
 def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stated:
     """Return how probable it is of every effect found that a name is right, or that none can be."""
     learned = usual_calibration()
-    situation, errors = (
-        of_situation(evidence, beliefs),
-        (evidence.noise, max(evidence.after, ROUNDING)),
-    )
+    situation = of_situation(evidence, beliefs)
+    errors = evidence.noise, max(evidence.after, ROUNDING)
     if evidence.families is not None:
         return Stated(table, (), None, situation, errors)
     sizes = [size / evidence.noise for size in evidence.sizes]
@@ -160,10 +161,9 @@ def _stated_of(
         return _of_row(cause, row, *_probabilities(levels)), levels
     if families and cause.effect is not None:
         family = families[cause.name[0][0].effect]
-        kinds = sum(1 + len(one.joined) for one in families.values())
-        kind = of_kind(family, len(cause.name), kinds, *before.errors)
+        kind = before.of_kind(family, len(cause.name), sum(one.kinds for one in families.values()))
         each = (*both, 'name')
-        levels = [_told(f'{level} of many', k, {**situation, **kind}, learned) for level in each]
+        levels = [_told(f'{level} of many', k, kind, learned) for level in each]
         return _of_kind(cause, *_probabilities(levels)), levels
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]
     levels = [

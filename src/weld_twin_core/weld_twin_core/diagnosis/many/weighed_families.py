@@ -42,8 +42,6 @@ MOST_LIKE = 2
 """Kinds reported beside one at the most; what more than three would explain is no name."""
 JOINED = (2, 1 + MOST_LIKE)
 """Kinds that are put together to one set."""
-
-
 Believed = Callable[[Family, int], float]
 """How probable it is that a kind is right, where so many are named."""
 
@@ -85,7 +83,7 @@ class Weighed:
         believed: Believed,
     ) -> Family | None:
         """Return the fewest of the kinds doubted that are likelier right than wrong together."""
-        kinds = sum(1 + len(one.joined) for one in told)
+        kinds = sum(one.kinds for one in told)
         for size in JOINED:
             sets = [self.case.together(group, chosen) for group in combinations(doubted, size)]
             each = [

@@ -27,7 +27,7 @@ from weld_twin_core.diagnosis.calibration.features import (
 )
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.evidence import Alternative, Evidence, Row, Verdict
-from weld_twin_core.diagnosis.result import Cause, Site, Structure
+from weld_twin_core.diagnosis.result import Cause, Family, Site, Structure
 
 PLAY = Site('backlash', 'elbow_joint')
 
@@ -255,3 +255,26 @@ def test_others_share_what_the_first_leaves_as_before_and_none_is_likelier_than_
     # Of 0.75 three fifths would be 0.45, which is more than the first has.
     assert [value for _, value in told] == pytest.approx([first, *others])
     assert _led((), 0.4) == () and _led((('a', 1.0), ('b', 0.0)), 0.6)[1] == ('b', 0.0)
+
+
+@pytest.mark.parametrize(('growth', 'status'), [(3.0, 'identified'), (0.12, 'ambiguous')])
+def test_kinds_that_are_each_likelier_wrong_than_right_identify_nothing(growth, status):
+    site, size = Site('link_length', 'elbow_joint'), 1e-4 if growth > 1.0 else 1e-6
+    kind = Family(
+        'link_length', (growth, growth), True, ((site, size),), size, ((site, 1.0),), named=True
+    )
+    cause = Cause(
+        (('elbow_joint', 1.0),),
+        (('constant', 1.0),),
+        ((site, 1.0),),
+        0.9,
+        (0.8, 1.0),
+        (0,),
+        effect=0,
+    )
+    verdict = Verdict('identified', ((site,),), families=(kind,))
+    reported, (told,), _ = calibrated(
+        verdict, (cause,), Stated((), (), None, {}, (1e-5, 1e-5)), {}
+    )
+    assert (told.probability > 0.5) is (status == 'identified')
+    assert reported.status == status

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from weld_twin_core.diagnosis.evidence import LIKELIER
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 from weld_twin_core.diagnosis.verdict.decision import NO_GAP, UNEVEN
 
@@ -110,6 +111,17 @@ def _families(diagnosis: Diagnosis) -> str:
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
+    kinds = [one for one in diagnosis.causes if one.name and not one.rest]
+    if diagnosis.families and all(one.probability <= LIKELIER for one in kinds):
+        first = (
+            f'The {size} is explained best by many small errors together; these data do not tell'
+        )
+        likeliest = max(kinds, key=lambda one: one.probability, default=None)
+        if likeliest is None:
+            return f'{first} which.', _gain(diagnosis)
+        names = listed([*dict.fromkeys(called(site.effect) for site, _ in likeliest.name)], 'or')
+        odds_of = percent(likeliest.probability)
+        return f'{first} which, likeliest {names} ({odds_of}).', _gain(diagnosis)
     choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
     unsure = open_sites(diagnosis)
     sure = [result for result in diagnosis.effects if site_of(result) not in unsure]

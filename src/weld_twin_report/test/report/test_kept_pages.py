@@ -21,7 +21,7 @@ from rich.console import Console
 
 from weld_twin_core import __version__
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.result import Candidate, Check, Found, Shares, Site
+from weld_twin_core.diagnosis.result import Candidate, Check, Family, Found, Shares, Site
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.wording.mending import remaining_without
@@ -297,6 +297,20 @@ def clocks(level):
     return replace(case, checks=(Check('clocks', level, 'As they are.'),))
 
 
+def each_kind_doubted():
+    case = whole('calibration')
+    causes = tuple(
+        replace(c, probability=0.4 if k == 0 else 0.2) for k, c in enumerate(case.causes)
+    )
+    kinds = dict.fromkeys(each.effect.name for each in case.effects)
+    families = tuple(
+        Family(kind, (0.2, 0.3), True, ((Site(kind, 'joint_1'), 2e-4),), 2e-4, named=True)
+        for kind in kinds
+    )
+    said = {'causes': causes, 'families': families, 'confidence': 0.2}
+    return replace(case, status='ambiguous', indistinguishable=(), **said)
+
+
 AT_REST = 'the joint hardly moves (wrist_1_joint)'
 LABELS = {'joint_a1': 'A1', 'joint_a3': 'E<3>'}
 THIRD = (('joint_a5', 0.29), ('joint_a6', 0.29), ('joint_a4', 0.28))
@@ -418,7 +432,7 @@ CASES = {
     },
     'clocks': {'not found right': lambda: clocks('note')},
     'imitated': {'by what is of no use': lambda: imitated(ratio=1.0)},
-    'calibration': {},
+    'calibration': {'each kind doubted': each_kind_doubted},
     'stations': {},
     'nothing': {},
 }

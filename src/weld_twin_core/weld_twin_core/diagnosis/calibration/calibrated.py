@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from ..algebra.definite import ROUNDING
 from ..beliefs import Beliefs
-from ..evidence import Evidence, Row, Verdict, marginal
+from ..evidence import LIKELIER, Evidence, Row, Verdict, marginal
 from ..result import NAMING, Cause, Family
 from .features import (
     TOLD_AS,
@@ -25,6 +25,9 @@ from .features import (
 from .weights import Calibration, Features, usual_calibration
 
 Key = TypeVar('Key')
+_DOUBTED = (
+    'each kind is likelier wrong than right by itself: these data do not tell which of them it is'
+)
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,12 @@ def calibrated(
     )
     whole = {**before.situation, **whole, **form}
     verdict, more = _of_answer(verdict, whole, learned)
+    if (
+        kinds
+        and verdict.status == 'identified'
+        and all(p <= LIKELIER for p in _probabilities(kinds))
+    ):
+        verdict = replace(verdict, status='ambiguous', reasons=(*verdict.reasons, _DOUBTED))
     if verdict.sure and verdict.status in NAMING:
         # Who is sure of the whole answer is sure of each part of it.
         reported = [replace(cause, sure=True) for cause in reported]

@@ -9,18 +9,17 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.motion.paths import Line, default_seam
 from weld_twin_core.sensitivity import (
-    Placement,
     advise,
     compare_profiles,
     default_tolerances,
     default_values,
-    end_of_linearity,
     planned_study,
-    scenario_deviations,
     sweep,
 )
 from weld_twin_core.sensitivity.claims import CaseName, judge, measure_case
-from weld_twin_core.sensitivity.claims.combined_measures import growth_exponent
+from weld_twin_core.sensitivity.claims.measures import growth_exponent
+from weld_twin_core.sensitivity.sweep import end_of_linearity, scenario_deviations
+from weld_twin_core.sensitivity.trajectory_advice import Placement
 
 
 @pytest.fixture(scope='module')

@@ -8,14 +8,9 @@ import pytest
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import REGISTRY, Stage
 from weld_twin_core.motion.paths import default_seam
-from weld_twin_core.sensitivity import (
-    arc_weights,
-    default_tolerances,
-    exact_deviations,
-    local_sensitivity,
-    planned_study,
-    posture,
-)
+from weld_twin_core.sensitivity import default_tolerances, local_sensitivity, planned_study
+from weld_twin_core.sensitivity.evaluate import exact_deviations
+from weld_twin_core.sensitivity.local import arc_weights, posture
 
 # A bearing's lean is nothing on a wrist that stands at a right angle, nor is what a tool sags by an axis
 # that stays level: neither has a slope to compare.

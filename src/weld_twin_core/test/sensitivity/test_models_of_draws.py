@@ -18,8 +18,7 @@ from weld_twin_core.sensitivity import (
     WeldTolerance,
     default_tolerances,
     draws_at,
-    exact_deviations,
-    expected_rms,
+    expected_deviation,
     model,
     planned_study,
     probabilities,
@@ -27,8 +26,10 @@ from weld_twin_core.sensitivity import (
     tolerance_stack,
     tolerances_from_list,
 )
+from weld_twin_core.sensitivity.evaluate import exact_deviations
 from weld_twin_core.sensitivity.memory_draws import remembered
 from weld_twin_core.sensitivity.seam_study import outcomes
+from weld_twin_core.sensitivity.trajectory_advice import rms_over_arc
 
 
 @pytest.fixture(scope='module')
@@ -167,7 +168,8 @@ def test_expected_deviation_is_the_root_mean_square_of_many_runs(study):
     square = (exact_deviations(study, tolerances, draws) ** 2).sum(axis=-1).mean(axis=0)
     steps = np.abs(np.diff(study.s))
     mean = (0.5 * (square[1:] + square[:-1]) * steps).sum() / steps.sum()
-    assert expected_rms(study, tolerances) == pytest.approx(np.sqrt(mean), rel=0.02)
+    expected = rms_over_arc(study, expected_deviation(study, tolerances))
+    assert expected == pytest.approx(np.sqrt(mean), rel=0.02)
 
 
 def test_stack_counts_across_and_stickout_apart():

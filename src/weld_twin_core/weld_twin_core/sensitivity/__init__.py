@@ -20,58 +20,27 @@ How far is the tool off, at most, in 95 of 100 arms with the default tolerances?
 """
 
 from .distribution import Distribution
-from .evaluate import Model, draws_at, exact_deviations, model
-from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
+from .evaluate import Model, draws_at, model
+from .local import LocalSensitivity, local_sensitivity
 from .morris import MorrisDesign, Screening, morris_screening
-from .seam_study import (
-    POINTS,
-    Outcomes,
-    Study,
-    outcomes,
-    planned_study,
-    recorded_study,
-    study_of_plan,
-    with_known,
-)
+from .seam_study import Outcomes, Study, planned_study, recorded_study, study_of_plan
 from .sobol import SobolDesign, SobolIndices, sobol_indices
-from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
-from .sweep import (
-    Sizes,
-    Sweep,
-    cumulative,
-    default_values,
-    end_of_linearity,
-    scenario_deviations,
-    spread_of_passes,
-    sweep,
-    together,
-)
-from .tolerance import (
-    FAMILIES,
-    Tolerance,
-    default_tolerances,
-    scaled,
-    tolerances_from_list,
-    with_draws,
-)
+from .stack import ToleranceStack, WeldTolerance, probabilities, tolerance_stack
+from .sweep import Sweep, default_values, sweep
+from .tolerance import Tolerance, default_tolerances, scaled, tolerances_from_list
 from .trajectory_advice import (
-    Placement,
     PlacementResult,
     ProfileResult,
     Room,
     advise,
     compare_profiles,
     expected_deviation,
-    expected_rms,
 )
 
-__all__ = ['FAMILIES', 'POINTS', 'Distribution', 'LocalSensitivity', 'Model', 'MorrisDesign']
-__all__ += ['Outcomes', 'Placement', 'PlacementResult', 'Posture', 'Probability', 'ProfileResult']
-__all__ += ['Room', 'Screening', 'Sizes', 'SobolDesign', 'SobolIndices', 'Study', 'Sweep']
-__all__ += ['Tolerance', 'ToleranceStack', 'WeldTolerance', 'advise', 'arc_weights']
-__all__ += ['compare_profiles', 'cumulative', 'default_tolerances', 'default_values', 'draws_at']
-__all__ += ['end_of_linearity', 'exact_deviations', 'expected_deviation', 'expected_rms']
-__all__ += ['local_sensitivity', 'model', 'morris_screening', 'outcomes', 'planned_study']
-__all__ += ['posture', 'probabilities', 'recorded_study', 'scaled', 'scenario_deviations']
-__all__ += ['sobol_indices', 'spread_of_passes', 'study_of_plan', 'sweep', 'together']
-__all__ += ['tolerance_stack', 'tolerances_from_list', 'with_draws', 'with_known']
+__all__ = ['Distribution', 'LocalSensitivity', 'Model', 'MorrisDesign', 'Outcomes']
+__all__ += ['PlacementResult', 'ProfileResult', 'Room', 'Screening', 'SobolDesign', 'SobolIndices']
+__all__ += ['Study', 'Sweep', 'Tolerance', 'ToleranceStack', 'WeldTolerance', 'advise']
+__all__ += ['compare_profiles', 'default_tolerances', 'default_values', 'draws_at']
+__all__ += ['expected_deviation', 'local_sensitivity', 'model', 'morris_screening']
+__all__ += ['planned_study', 'probabilities', 'recorded_study', 'scaled', 'sobol_indices']
+__all__ += ['study_of_plan', 'sweep', 'tolerance_stack', 'tolerances_from_list']

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,13 +16,48 @@ from scipy.special import ndtr, ndtri
 from ..arrays import Array
 from ..errors import ModelError
 
-_KINDS: dict[str, tuple[str, ...]] = {
-    'normal': ('mean', 'std'),
-    'uniform': ('low', 'high'),
-    'triangular': ('low', 'mode', 'high'),
-    'lognormal': ('median', 'spread'),
+
+def _below_triangle(value: float, low: float, mode: float, high: float) -> float:
+    if value <= low or value >= high:
+        return float(value >= high)
+    if value < mode:
+        return (value - low) ** 2 / ((high - low) * (mode - low))
+    return 1.0 - (high - value) ** 2 / ((high - low) * (high - mode))
+
+
+def _in_triangle(p: Array, low: float, mode: float, high: float) -> Array:
+    rise, fall = (mode - low) * (high - low), (high - mode) * (high - low)
+    rising, falling = low + np.sqrt(p * rise), high - np.sqrt((1.0 - p) * fall)
+    return np.where(p * (high - low) < mode - low, rising, falling)
+
+
+class _Law(NamedTuple):
+    """A kind of distribution, by the names of its numbers."""
+
+    names: tuple[str, ...]
+    below: Callable[..., Any]
+    """From a value and the numbers to the probability below it."""
+    at: Callable[..., Array]
+    """From probabilities (...) and the numbers to values."""
+
+
+_LAWS = {
+    'normal': _Law(
+        ('mean', 'std'), lambda x, m, s: ndtr((x - m) / s), lambda p, m, s: m + s * ndtri(p)
+    ),
+    'uniform': _Law(
+        ('low', 'high'),
+        lambda x, a, b: np.clip((x - a) / (b - a), 0.0, 1.0),
+        lambda p, a, b: a + (b - a) * p,
+    ),
+    'triangular': _Law(('low', 'mode', 'high'), _below_triangle, _in_triangle),
+    'lognormal': _Law(
+        ('median', 'spread'),
+        lambda x, m, s: ndtr(np.log(x / m) / s) if x > 0.0 else 0.0,
+        lambda p, m, s: m * np.exp(s * ndtri(p)),
+    ),
 }
-"""Distributions and their numbers; the spread of a lognormal is the std of the logarithm."""
+"""Distributions; the spread of a lognormal is the std of the logarithm."""
 _DEFAULTS = {'mean': 0.0}
 """Parameters that may be left out."""
 
@@ -32,19 +67,15 @@ class Distribution:
     """A distribution, cut off at the bounds of the parameter."""
 
     kind: str
-    """One of `_KINDS`."""
+    """One of `_LAWS`."""
     numbers: tuple[float, ...]
-    """In the order of `_KINDS`, in the unit of the parameter."""
+    """In the order of its law, in the unit of the parameter."""
     lower: float = -np.inf
     upper: float = np.inf
     """Values outside have no probability."""
 
     def __post_init__(self) -> None:
-        if self.kind not in _KINDS:
-            raise ModelError(
-                f'a distribution must be one of {", ".join(_KINDS)}, got {self.kind!r}'
-            )
-        names = _KINDS[self.kind]
+        names = _law(self.kind).names
         if len(self.numbers) != len(names) or not np.isfinite(self.numbers).all():
             raise ModelError(
                 f'a {self.kind} distribution needs {", ".join(names)}, got {self.numbers}'
@@ -67,24 +98,15 @@ class Distribution:
 
     def _text(self) -> str:
         return ', '.join(
-            f'{k} {v:g}' for k, v in zip(_KINDS[self.kind], self.numbers, strict=True)
+            f'{k} {v:g}' for k, v in zip(_law(self.kind).names, self.numbers, strict=True)
         )
-
-    def _below(self, value: float) -> float:
-        """Return the probability below a value."""
-        v = self.numbers
-        match self.kind:
-            case 'normal':
-                return float(ndtr((value - v[0]) / v[1]))
-            case 'uniform':
-                return float(np.clip((value - v[0]) / (v[1] - v[0]), 0.0, 1.0))
-            case 'lognormal':
-                return float(ndtr(np.log(value / v[0]) / v[1])) if value > 0.0 else 0.0
-        return _below_triangle(value, *v)
 
     def _mass(self) -> tuple[float, float]:
         """Return the probability below the lower and below the upper bound."""
-        return self._below(self.lower), self._below(self.upper)
+        low, high = (
+            float(_law(self.kind).below(end, *self.numbers)) for end in (self.lower, self.upper)
+        )
+        return low, high
 
     def values(self, unit: ArrayLike) -> Array:
         """Return the values at probabilities (...) from 0 to 1, in the parameter's unit."""
@@ -92,20 +114,7 @@ class Distribution:
         p = low + (high - low) * np.asarray(unit, dtype=np.float64)
         # The ends of an unbounded distribution are at infinity; no sample may land there.
         p = np.clip(p, 1e-12, 1.0 - 1e-12)
-        v = self.numbers
-        match self.kind:
-            case 'normal':
-                return np.asarray(v[0] + v[1] * ndtri(p))
-            case 'uniform':
-                return np.asarray(v[0] + (v[1] - v[0]) * p)
-            case 'lognormal':
-                return np.asarray(v[0] * np.exp(v[1] * ndtri(p)))
-        rise, fall = (v[1] - v[0]) * (v[2] - v[0]), (v[2] - v[1]) * (v[2] - v[0])
-        return np.where(
-            p * (v[2] - v[0]) < v[1] - v[0],
-            v[0] + np.sqrt(p * rise),
-            v[2] - np.sqrt((1.0 - p) * fall),
-        )
+        return np.asarray(_law(self.kind).at(p, *self.numbers))
 
     @property
     def mean(self) -> float:
@@ -119,23 +128,19 @@ class Distribution:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the keys of a tolerance file."""
-        numbers = dict(zip(_KINDS[self.kind], map(float, self.numbers), strict=True))
+        numbers = dict(zip(_law(self.kind).names, map(float, self.numbers), strict=True))
         return {'distribution': self.kind, **numbers}
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any], lower: float, upper: float) -> Distribution:
         """Build one from a tolerance file's keys, within bounds; ModelError where a key is wrong."""
         kind = str(data.get('distribution', 'normal'))
-        if kind not in _KINDS:
-            raise ModelError(f'a distribution must be one of {", ".join(_KINDS)}, got {kind!r}')
-        unknown = sorted(set(map(str, data)) - {'distribution', *_KINDS[kind]})
+        names = _law(kind).names
+        unknown = sorted(set(map(str, data)) - {'distribution', *names})
         if unknown:
-            raise ModelError(
-                f'a {kind} distribution takes {", ".join(_KINDS[kind])}, not {unknown[0]!r}'
-            )
-        values = {**{k: v for k, v in _DEFAULTS.items() if k in _KINDS[kind]}, **data}
+            raise ModelError(f'a {kind} distribution takes {", ".join(names)}, not {unknown[0]!r}')
         try:
-            numbers = tuple(float(values[key]) for key in _KINDS[kind])
+            numbers = tuple(float({**_DEFAULTS, **data}[key]) for key in names)
         except KeyError as error:
             raise ModelError(f'a {kind} distribution needs the key {error}') from None
         except (TypeError, ValueError):
@@ -143,12 +148,10 @@ class Distribution:
         return cls(kind, numbers, lower, upper)
 
 
-def _below_triangle(value: float, low: float, mode: float, high: float) -> float:
-    if value <= low or value >= high:
-        return float(value >= high)
-    if value < mode:
-        return (value - low) ** 2 / ((high - low) * (mode - low))
-    return 1.0 - (high - value) ** 2 / ((high - low) * (high - mode))
+def _law(kind: str) -> _Law:
+    if kind not in _LAWS:
+        raise ModelError(f'a distribution must be one of {", ".join(_LAWS)}, got {kind!r}')
+    return _LAWS[kind]
 
 
 _MIDPOINTS = (np.arange(2000) + 0.5) / 2000.0

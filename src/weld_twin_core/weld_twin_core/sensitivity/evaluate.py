@@ -140,17 +140,7 @@ def draws_at(tolerances: Sequence[Tolerance], unit: Array) -> Array:
 
 
 def exact_deviations(study: Study, tolerances: Sequence[Tolerance], draws: Array) -> Array:
-    """
-    Return the exact twin's deviations in seam axes, shape (D, N, 3) [m].
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance, length P
-    draws : array, shape (D, P)
-        In the units of the tolerances.
-
-    """
+    """Return the exact twin's deviations in seam axes, (D, N, 3) [m], of draws (D, P) in their units."""
     return study.deviations(with_draws(study.known, tolerances, draws))
 
 

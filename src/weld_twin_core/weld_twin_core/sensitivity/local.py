@@ -25,7 +25,7 @@ from ..twin.twin import Twin
 from .evaluate import exact_deviations
 from .memory_draws import MEMORY
 from .seam_study import Study
-from .tolerance import Tolerance, with_draws
+from .tolerance import Tolerance, places, with_draws
 
 _FORWARD = 1e-4
 """Step of the difference at no error, in parts of the tolerance."""
@@ -138,15 +138,7 @@ def _relative(difference: Array, scale: Array) -> Array:
 
 
 def arc_weights(s: Array) -> Array:
-    """
-    Return the part of the travelled arc length that belongs to each path point, shape (N,).
-
-    Parameters
-    ----------
-    s : array, shape (N,) [m]
-        Arc length at every path point.
-
-    """
+    """Return the part of the way, of arc lengths (N,) [m], that belongs to each path point, (N,)."""
     steps = np.abs(np.diff(s))
     if not steps.sum() > 0.0:
         return np.full(len(s), 1.0 / len(s))
@@ -192,15 +184,9 @@ def _linearised(
     """Return d position / d parameter (P, N, 3) in seam axes, and |d orientation| (P, N)."""
     twin = Twin(study.robot, with_draws(study.known, tolerances, draws))
     _, change = twin.linearise(study.recording, study.at)
-    place = {
-        (twin.effects[c.effect].name, twin.effects[c.effect].site, c.parameter.name, c.index): k
-        for k, c in enumerate(twin.components())
-    }
-    columns = [place.get((t.effect, t.joint, t.parameter, t.index)) for t in tolerances]
+    place = places(twin.effects, tolerances)
     out = np.zeros((len(tolerances), study.samples, 6))
-    for k, column in enumerate(columns):
-        if column is not None:
-            out[k] = change[:, :, column]
+    out[list(place)] = np.moveaxis(change[:, :, list(place.values())], -1, 0)
     return study.on_seam(out[..., :3]), np.linalg.norm(out[..., 3:], axis=-1)
 
 
@@ -240,14 +226,7 @@ class Posture:
 
 
 def posture(study: Study) -> Posture:
-    """
-    Return condition number, manipulability and largest gain along a seam.
-
-    Parameters
-    ----------
-    study : Study
-
-    """
+    """Return condition number, manipulability and largest gain along a seam."""
     strength = np.linalg.svd(jacobian(study.robot, study.q)[..., :3, :], compute_uv=False)
     smallest = np.maximum(strength[..., -1], np.finfo(float).tiny)
     gain = np.asarray(strength[..., 0], dtype=np.float64)

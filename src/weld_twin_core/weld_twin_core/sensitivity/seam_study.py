@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -178,20 +178,6 @@ def _away(rotation: Array, tangent: Array) -> Array:
     return np.where(head_on, -rotation[..., 0], wire)
 
 
-def with_known(study: Study, known: tuple[Effect, ...]) -> Study:
-    """
-    Return the study counted from a twin with other known effects.
-
-    Parameters
-    ----------
-    study : Study
-    known : tuple of Effect
-
-    """
-    nominal = Twin(study.robot, known).poses(study.recording, study.at)
-    return replace(study, known=known, nominal=nominal)
-
-
 class Outcomes(NamedTuple):
     """
     Numbers of D runs, shape (D,) each.
@@ -209,17 +195,7 @@ class Outcomes(NamedTuple):
 
 
 def outcomes(off: Array, length: float) -> Outcomes:
-    """
-    Return what runs come to.
-
-    Parameters
-    ----------
-    off : array, shape (3, D, N) [m]
-        Deviations along, across and normal to the seam.
-    length : float [m]
-        Of the seam.
-
-    """
+    """Return what runs come to by deviations along, across and normal, (3, D, N) [m], and length [m]."""
     along, across, normal = off
     square = along * along
     square += across * across

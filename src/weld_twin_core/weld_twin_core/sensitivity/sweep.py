@@ -84,20 +84,7 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
 
 def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name: str) -> Sweep:
-    """
-    Return the deviation over the size of several errors that are all equal.
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance
-        All of one unit.
-    values : array, shape (V,)
-        Sizes of the errors, in that unit.
-    name : str
-        What the result is called.
-
-    """
+    """Return the deviation over the size, (V,) in their unit, of several errors that are all equal."""
     # The slope at no error, from an error too small to bend and large enough to compute.
     small = 1e-4 * float(np.abs(values).max())
     sizes = np.concatenate([[small], np.asarray(values, dtype=np.float64)])
@@ -134,21 +121,7 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
 
 def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -> float | None:
-    """
-    Return the smallest error at which D departs from proportion by `_BENT`.
-
-    Parameters
-    ----------
-    study : Study
-    tolerance : Tolerance
-    largest : float
-        Where the search ends, in the unit of the parameter.
-
-    Returns
-    -------
-    float, or None where D stays in proportion up to ``largest``
-
-    """
+    """Return the smallest error at which D departs from proportion by `_BENT`; None for none."""
     result = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
     bent = np.abs(result.departure) > _BENT
     return float(result.values[np.argmax(bent)]) if bent.any() else None
@@ -181,21 +154,7 @@ def _sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect
 
 
 def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, Array]:
-    """
-    Return the deviations of every source alone and of all together, in seam axes.
-
-    Parameters
-    ----------
-    study : Study
-    sizes : Sizes, optional
-        Left out, those of the paper.
-
-    Returns
-    -------
-    dict of str to array, shape (N, 3) [m]
-        By source; 'combined' for all together.
-
-    """
+    """Return the deviations (N, 3) [m] of every source alone and of all ('combined'), in seam axes."""
     each = _sources(study.robot, sizes)
     out = {name: study.deviations((*study.known, *effects)) for name, effects in each.items()}
     every = tuple(effect for effects in each.values() for effect in effects)
@@ -204,15 +163,9 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
 
 def spread_of_passes(study: Study, deviations: Array) -> Array:
     """
-    Return how far apart the passes over one place of the seam are, shape (...) [m].
+    Return how far apart the passes of deviations (..., N, 3) over one place of the seam are, (...) [m].
 
     The median over twentieths of the seam.
-
-    Parameters
-    ----------
-    study : Study
-    deviations : array, shape (..., N, 3) [m]
-
     """
     part = np.floor(study.s / study.length * 20.0).astype(int)
     apart = [
@@ -223,12 +176,5 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
 
 
 def cumulative(deviations: Array) -> Array:
-    """
-    Return D_cum up to every sample (paper, eq. III.iv), shape (N,) [m].
-
-    Parameters
-    ----------
-    deviations : array, shape (N, 3) [m]
-
-    """
+    """Return D_cum of deviations (N, 3) up to every sample (paper, eq. III.iv), shape (N,) [m]."""
     return np.cumsum(np.linalg.norm(deviations, axis=-1))

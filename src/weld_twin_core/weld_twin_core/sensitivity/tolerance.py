@@ -177,15 +177,9 @@ def with_draws(
     known: Sequence[Effect], tolerances: Sequence[Tolerance], draws: Array
 ) -> tuple[Effect, ...]:
     """
-    Return effects whose uncertain parameters carry draws.
+    Return effects whose uncertain parameters carry draws, (D, P), or (P,) for plain numbers.
 
-    Parameters
-    ----------
-    known : sequence of Effect
-        Effects believed to act; a draw is added to the value a parameter has there.
-    tolerances : sequence of Tolerance, length P
-    draws : array, shape (D, P), or (P,) for plain numbers
-
+    A draw is added to the value that a parameter has in the effects believed to act.
     """
     columns: dict[tuple[str, str | None], list[int]] = {}
     for k, tolerance in enumerate(tolerances):
@@ -201,6 +195,18 @@ def with_draws(
             vector[..., place[tolerances[k].parameter, tolerances[k].index]] += draws[..., k]
         out[key] = effect.with_vector(vector)
     return (*others, *out.values())
+
+
+def places(effects: Sequence[Effect], tolerances: Sequence[Tolerance]) -> dict[int, int]:
+    """Return which of the differentiable components of effects each tolerance is that is one."""
+    keys = [
+        (effect.name, effect.site, parameter.name, index)
+        for effect in effects
+        for parameter, index in effect.components()
+        if parameter.differentiable
+    ]
+    wanted = [(t.effect, t.joint, t.parameter, t.index) for t in tolerances]
+    return {k: keys.index(key) for k, key in enumerate(wanted) if key in keys}
 
 
 def scaled(tolerances: Sequence[Tolerance], factors: Mapping[str, float]) -> tuple[Tolerance, ...]:

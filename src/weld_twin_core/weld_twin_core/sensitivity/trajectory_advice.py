@@ -27,7 +27,7 @@ from ..recording import JointMotion, Recording
 from ..twin.twin import Twin
 from .local import arc_weights
 from .seam_study import Study, planned_study
-from .tolerance import Tolerance, with_draws
+from .tolerance import Tolerance, places, with_draws
 
 _POINTS = 17
 """Points of the seam at which placements are compared."""
@@ -50,19 +50,6 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     return _Scatter.of(study.known, tolerances).deviation(study)
 
 
-def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
-    """
-    Return the root of the expected squared deviation over the arc length [m].
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance
-
-    """
-    return rms_over_arc(study, expected_deviation(study, tolerances))
-
-
 def rms_over_arc(study: Study, deviation: Array) -> float:
     """Return the root mean square over the arc length of deviations (N,) [m]."""
     return float(np.sqrt((deviation**2 * arc_weights(study.s)).sum()))
@@ -81,15 +68,8 @@ class _Scatter:
         mean = np.array([t.distribution.mean for t in tolerances])
         std = np.array([t.distribution.std for t in tolerances])
         effects = with_draws(known, tolerances, mean)
-        scalars = [
-            (effect.name, effect.site, parameter.name, index)
-            for effect in effects
-            for parameter, index in effect.components()
-            if parameter.differentiable
-        ]
-        place = {key: k for k, key in enumerate(scalars)}
-        columns = [place[t.effect, t.joint, t.parameter, t.index] for t in tolerances]
-        return cls(effects, std, columns)
+        place = places(effects, tolerances)
+        return cls(effects, std[list(place)], list(place.values()))
 
     def deviation(self, study: Study) -> Array:
         """Return the root of the expected squared deviation at every path point, (N,) [m]."""
@@ -146,17 +126,10 @@ def compare_profiles(
     slowest = max(float(study.t[-1]) for study in studies.values())
     out = []
     for name, study in studies.items():
-        each = expected_deviation(study, tolerances)
         same = _stretched(study, slowest / float(study.t[-1]))
-        out.append(
-            ProfileResult(
-                name,
-                float(study.t[-1]),
-                expected_rms(study, tolerances),
-                float(each.max()),
-                expected_rms(same, tolerances),
-            )
-        )
+        each, later = (expected_deviation(one, tolerances) for one in (study, same))
+        rms = rms_over_arc(study, each), rms_over_arc(same, later)
+        out.append(ProfileResult(name, float(study.t[-1]), rms[0], float(each.max()), rms[1]))
     return tuple(out)
 
 

@@ -16,13 +16,13 @@ from weld_twin_core.effects import Effect
 from weld_twin_core.motion.paths import Path, Torch
 from weld_twin_core.recording import Recording
 from weld_twin_core.sensitivity import (
-    POINTS,
     Study,
     Tolerance,
     WeldTolerance,
     planned_study,
     recorded_study,
 )
+from weld_twin_core.sensitivity.seam_study import POINTS
 
 PROFILES = ('smooth', 'aggressive')
 RECORDED = 'recorded'

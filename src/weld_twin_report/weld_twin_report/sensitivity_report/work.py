@@ -26,7 +26,9 @@ from weld_twin_core.sensitivity import (
     Tolerance,
     ToleranceStack,
 )
+from weld_twin_core.sensitivity.local import posture
 from weld_twin_core.sensitivity.seam_study import joined
+from weld_twin_core.sensitivity.sweep import end_of_linearity
 from weld_twin_nodes.offline.content_hash import digest
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
@@ -112,7 +114,7 @@ def unpacked(text: str) -> Outcomes:
 def local(study: Study, tolerances: tuple[Tolerance, ...]) -> dict[str, Any]:
     """Return the local sensitivities, and how the arm stands."""
     result = sensitivity.local_sensitivity(study, tolerances)
-    stand = sensitivity.posture(study)
+    stand = posture(study)
     return {
         **result.as_dict(),
         'posture': {'s_m': study.s, **asdict(stand)},
@@ -127,7 +129,7 @@ def sweeps(study: Study, tolerances: tuple[Tolerance, ...]) -> list[dict[str, An
         result = sensitivity.sweep(study, tolerance, sensitivity.default_values(tolerance))
         end = None
         if tolerance.unit == 'rad' and tolerance.effect != 'backlash':
-            end = sensitivity.end_of_linearity(study, tolerance)
+            end = end_of_linearity(study, tolerance)
         out.append({**result.as_dict(), 'linear_up_to': end})
     return out
 

@@ -15,6 +15,18 @@ from ...errors import DataError
 _Measured = Mapping[str, float]
 
 
+_DEGREE_IN_MM = 1e3 * np.pi / 180.0
+"""Factor from metres a radian to millimetres a degree."""
+_UNITS = {
+    'percent': 100.0,
+    'mm': 1e3,
+    'ppm': 1e6,
+    'degrees': 180.0 / np.pi,
+    'mm_per_degree': _DEGREE_IN_MM,
+}
+"""What a range may be told in, and its factor."""
+
+
 class _Range:
     """What a measurement was over all cases; formats as its least and largest value."""
 
@@ -27,8 +39,14 @@ class _Range:
         low, high = format(self.low, kind), format(self.high, kind)
         return low if low == high else f'{low} to {high}'
 
-    def __mul__(self, factor: float) -> _Range:
-        return _Range([self.low * factor, self.high * factor])
+    def __getattr__(self, unit: str) -> _Range:
+        """Return the same in one of `_UNITS`."""
+        return _Range([self.low * _UNITS[unit], self.high * _UNITS[unit]])
+
+    @property
+    def size(self) -> float:
+        """Return the largest it was, to either side of zero."""
+        return max(abs(self.low), abs(self.high))
 
 
 @dataclass(frozen=True)
@@ -41,8 +59,8 @@ class Rule:
     """Name, what the paper says, and in which section."""
     holds: Callable[[_Measured], bool]
     """Whether the claim as written holds on one case."""
-    reason: Callable[[Mapping[str, _Range]], str]
-    """One line made of the ranges of the measurements."""
+    reason: str
+    """One line in which the ranges of the measurements are put."""
     shows: tuple[str, ...]
     """Measurements the table gives."""
     condition: str = ''
@@ -51,8 +69,6 @@ class Rule:
     """Whether it holds on one case under that condition."""
 
 
-_DEGREE_IN_MM = 1e3 * np.pi / 180.0
-"""Factor from metres a radian to millimetres a degree."""
 _SAME = 1e-3
 """Ratios closer to one than this are the same."""
 
@@ -62,7 +78,7 @@ _RULES: tuple[Rule, ...] = (
         'Without errors D_norm is about 0, at the limit of the arithmetic',
         'IV.i',
         lambda m: m['baseline_d_norm'] < 1e-9,
-        lambda r: f'D_norm is {r["baseline_d_norm"]:.1e}, the closure of the inverse kinematics',
+        'D_norm is {baseline_d_norm:.1e}, the closure of the inverse kinematics',
         ('baseline_d_norm',),
     ),
     Rule(
@@ -70,11 +86,8 @@ _RULES: tuple[Rule, ...] = (
         'An initialization error shifts the path by a constant, without drift',
         'IV.ii',
         lambda m: m['init_spread'] < _SAME and m['init_turn_spread'] < _SAME,
-        lambda r: (
-            f'a displaced base gives the same shift everywhere (spread '
-            f'{r["init_spread"]:.0e}), a turned base one that changes along the seam by '
-            f'{r["init_turn_spread"] * 100.0:.0f} %'
-        ),
+        'a displaced base gives the same shift everywhere (spread {init_spread:.0e}), a turned '
+        'base one that changes along the seam by {init_turn_spread.percent:.0f} %',
         ('init_spread', 'init_turn_spread'),
         'the error is a displacement, not a turn',
         lambda m: m['init_spread'] < _SAME,
@@ -88,10 +101,8 @@ _RULES: tuple[Rule, ...] = (
             and abs(m['init_growth']) < _SAME
             and abs(m['init_turn_S_m'] - 1.0) < 0.05
         ),
-        lambda r: (
-            f'an identity for a displacement (S = {r["init_S"]:.3f}, growth '
-            f'{r["init_growth"]:.0e}); a turn has the lever arm, {r["init_turn_S_m"]:.2f} m/rad'
-        ),
+        'an identity for a displacement (S = {init_S:.3f}, growth {init_growth:.0e}); a turn '
+        'has the lever arm, {init_turn_S_m:.2f} m/rad',
         ('init_S', 'init_growth', 'init_turn_S_m'),
         'the error is a displacement, not a turn',
         lambda m: abs(m['init_S'] - 1.0) < _SAME and abs(m['init_growth']) < _SAME,
@@ -101,11 +112,9 @@ _RULES: tuple[Rule, ...] = (
         'The same angular error deviates more on an aggressive than on a smooth motion',
         'IV.iii',
         lambda m: m['offset_ratio'] > 1.0 + _SAME,
-        lambda r: (
-            f'with a constant offset the peaks have the ratio {r["offset_ratio"]:.4f} and '
-            f'equal arc length means equal deviation (within {r["offset_same_arc"]:.0e}); with '
-            f'5 ms of lag the ratio is {r["lag_ratio"]:.1f}'
-        ),
+        'with a constant offset the peaks have the ratio {offset_ratio:.4f} and equal arc '
+        'length means equal deviation (within {offset_same_arc:.0e}); with 5 ms of lag the '
+        'ratio is {lag_ratio:.1f}',
         ('offset_ratio', 'offset_same_arc', 'lag_ratio'),
         'the error depends on the motion, as servo lag does',
         lambda m: m['lag_ratio'] > 1.0 + _SAME,
@@ -115,11 +124,9 @@ _RULES: tuple[Rule, ...] = (
         'A smooth motion has the smaller cumulative drift',
         'IV.iii',
         lambda m: m['offset_mean_ratio'] > 1.0 + _SAME,
-        lambda r: (
-            f'for a constant offset the mean deviation per sample has the ratio '
-            f'{r["offset_mean_ratio"]:.3f} aggressive to smooth; a sum over samples only counts '
-            'for how long a motion lasts'
-        ),
+        'for a constant offset the mean deviation per sample has the ratio '
+        '{offset_mean_ratio:.3f} aggressive to smooth; a sum over samples only counts for how '
+        'long a motion lasts',
         ('offset_mean_ratio',),
     ),
     Rule(
@@ -127,11 +134,9 @@ _RULES: tuple[Rule, ...] = (
         'Smooth planning is mitigation',
         'V.viii',
         lambda m: m['plan_geometry_ratio'] > 1.01 and m['plan_lag_ratio'] > 1.01,
-        lambda r: (
-            f'expected deviation over arc length, aggressive to smooth: geometry '
-            f'{r["plan_geometry_ratio"]:.3f}; with lag and play {r["plan_lag_ratio"]:.2f}, and '
-            f'{r["plan_lag_ratio_same_time"]:.2f} when both take the same time'
-        ),
+        'expected deviation over arc length, aggressive to smooth: geometry '
+        '{plan_geometry_ratio:.3f}; with lag and play {plan_lag_ratio:.2f}, and '
+        '{plan_lag_ratio_same_time:.2f} when both take the same time',
         ('plan_geometry_ratio', 'plan_lag_ratio', 'plan_lag_ratio_same_time'),
         'errors follow speed (lag), and then mostly by being slow',
         lambda m: m['plan_lag_ratio'] > 1.01,
@@ -141,12 +146,9 @@ _RULES: tuple[Rule, ...] = (
         'Backlash deviates only locally, at reversals',
         'IV.iv',
         lambda m: m['local_share_play'] > 0.9,
-        lambda r: (
-            f'{r["local_share_play"] * 100.0:.0f} % of the squared deviation of play lies '
-            f'at the {r["local_share_of_points"] * 100.0:.0f} % of points near a reversal, as half '
-            f'the gap stays until the next one; as written it is '
-            f'{r["local_share_written"] * 100.0:.0f} %'
-        ),
+        '{local_share_play.percent:.0f} % of the squared deviation of play lies at the '
+        '{local_share_of_points.percent:.0f} % of points near a reversal, as half the gap '
+        'stays until the next one; as written it is {local_share_written.percent:.0f} %',
         ('local_share_play', 'local_share_of_points', 'local_share_written'),
         "backlash is the paper's one-sample formula, not play",
         lambda m: m['local_share_written'] > 0.9,
@@ -156,12 +158,9 @@ _RULES: tuple[Rule, ...] = (
         'Frequent reversals make backlash accumulate',
         'IV.iv, V.iv',
         lambda m: m['more_reversals_mean_play'] > 1.1,
-        lambda r: (
-            f'from 2 to 20 reversals the mean deviation of play changes by the factor '
-            f'{r["more_reversals_mean_play"]:.2f}; as written by '
-            f'{r["more_reversals_mean_written"]:.1f}, but then twice the sample rate makes '
-            f'it {r["finer_mean_written"]:.2f} of itself'
-        ),
+        'from 2 to 20 reversals the mean deviation of play changes by the factor '
+        '{more_reversals_mean_play:.2f}; as written by {more_reversals_mean_written:.1f}, but '
+        'then twice the sample rate makes it {finer_mean_written:.2f} of itself',
         ('more_reversals_mean_play', 'more_reversals_mean_written', 'finer_mean_written'),
         "backlash is the paper's one-sample formula, not play",
         lambda m: m['more_reversals_mean_written'] > 1.1,
@@ -171,12 +170,9 @@ _RULES: tuple[Rule, ...] = (
         'S of backlash is larger on aggressive than on smooth motion',
         'V.iv',
         lambda m: m['play_peak_ratio'] > 1.01,
-        lambda r: (
-            f'peak deviation of play, aggressive to smooth: {r["play_peak_ratio"]:.2f}; rms '
-            f'{r["play_rms_ratio"]:.2f}: half the gap on either motion; but passes over one place lie '
-            f'{(r["play_spread_aggressive_m"] * 1e3):.2f} mm apart, smooth '
-            f'{(r["play_spread_smooth_m"] * 1e3):.3f} mm'
-        ),
+        'peak deviation of play, aggressive to smooth: {play_peak_ratio:.2f}; rms '
+        '{play_rms_ratio:.2f}: half the gap on either motion; but passes over one place lie '
+        '{play_spread_aggressive_m.mm:.2f} mm apart, smooth {play_spread_smooth_m.mm:.3f} mm',
         (
             'play_peak_ratio',
             'play_rms_ratio',
@@ -192,12 +188,9 @@ _RULES: tuple[Rule, ...] = (
         'D_norm is proportional to |J| times the angular error',
         'IV.v',
         lambda m: max(abs(m['linear_departure_max']), abs(m['linear_departure_min'])) < 0.01,
-        lambda r: (
-            f'single joints to 0.5 deg: proportional within '
-            f'{max(abs(r["linear_departure_min"].low), abs(r["linear_departure_max"].high)):.0e}, 1 % '
-            f'off only from {r["linear_end_rad"] * 57.29578:.0f} deg; |J| is the upper bound, random '
-            f'offsets reach {r["bound_low"].low:.2f} to {r["bound_high"].high:.2f} of it'
-        ),
+        'single joints to 0.5 deg: proportional within {linear_departure_min.size:.0e}, 1 % '
+        'off only from {linear_end_rad.degrees:.0f} deg; |J| is the upper bound, random '
+        'offsets reach {bound_low.low:.2f} to {bound_high.high:.2f} of it',
         (
             'linear_departure_min',
             'linear_departure_max',
@@ -211,11 +204,8 @@ _RULES: tuple[Rule, ...] = (
         'Larger angular errors are amplified nonlinearly',
         'IV.v, V.ii',
         lambda m: m['linear_departure_max'] > 0.01,
-        lambda r: (
-            f'at 0.5 deg a joint is {r["linear_departure_max"] * 1e6:.1f} ppm from '
-            f'proportional, a chord below its arc; all joints together '
-            f'{r["linear_departure_all"] * 100.0:+.2f} %'
-        ),
+        'at 0.5 deg a joint is {linear_departure_max.ppm:.1f} ppm from proportional, a chord '
+        'below its arc; all joints together {linear_departure_all.percent:+.2f} %',
         ('linear_departure_max', 'linear_departure_all'),
     ),
     Rule(
@@ -223,10 +213,7 @@ _RULES: tuple[Rule, ...] = (
         'Less than 0.1 deg already moves the tool measurably',
         'IV.v',
         lambda m: m['tenth_degree_m'] > 1e-4,
-        lambda r: (
-            f'0.1 deg on the joint with most leverage moves the tool by '
-            f'{r["tenth_degree_m"] * 1e3:.2f} mm'
-        ),
+        '0.1 deg on the joint with most leverage moves the tool by {tenth_degree_m.mm:.2f} mm',
         ('tenth_degree_m',),
     ),
     Rule(
@@ -234,12 +221,10 @@ _RULES: tuple[Rule, ...] = (
         'Distal joints influence the deviation more than proximal ones',
         'V.ii',
         lambda m: m['distal_ratio'] > 1.0,
-        lambda r: (
-            f'equal angles act by their lever arm: outer to inner half of the joints '
-            f'{r["distal_ratio"]:.2f}, {r["distal_ratio_torch"]:.2f} with a bent torch; rank '
-            f'correlation with the joint number {r["distal_rank"]:.2f}; orientation does not tell '
-            f'joints apart (spread {r["turn_spread"]:.0e})'
-        ),
+        'equal angles act by their lever arm: outer to inner half of the joints '
+        '{distal_ratio:.2f}, {distal_ratio_torch:.2f} with a bent torch; rank correlation with '
+        'the joint number {distal_rank:.2f}; orientation does not tell joints apart (spread '
+        '{turn_spread:.0e})',
         ('distal_ratio', 'distal_ratio_torch', 'distal_rank', 'distal_rank_torch', 'turn_spread'),
     ),
     Rule(
@@ -247,11 +232,9 @@ _RULES: tuple[Rule, ...] = (
         'S_theta is larger than S_a',
         'V.iii',
         lambda m: m['S_theta_least_m'] > m['S_a_max'],
-        lambda r: (
-            f'in m/rad against m/m {r["S_theta_max_m"]:.2f} at most against '
-            f'{r["S_a_max"]:.2f}; per degree and mm {(r["S_theta_max_m"] * _DEGREE_IN_MM):.1f} '
-            f'against {r["S_a_max"]:.2f}: the unit decides, joints near the tool stay below in either'
-        ),
+        'in m/rad against m/m {S_theta_max_m:.2f} at most against {S_a_max:.2f}; per degree '
+        'and mm {S_theta_max_m.mm_per_degree:.1f} against {S_a_max:.2f}: the unit decides, '
+        'joints near the tool stay below in either',
         ('S_theta_max_m', 'S_theta_mean_m', 'S_theta_least_m', 'S_a_max'),
         'the joint has leverage and it is taken per degree against per mm',
         lambda m: m['S_theta_max_m'] * _DEGREE_IN_MM > m['S_a_max'],
@@ -261,10 +244,8 @@ _RULES: tuple[Rule, ...] = (
         'Link lengths give a systematic bias, proportional to the error',
         'V.iii',
         lambda m: m['S_a_departure'] < _SAME and m['S_a_spread'] < _SAME,
-        lambda r: (
-            f'proportional within {r["S_a_departure"]:.0e} and equally large along the seam '
-            f'(spread {r["S_a_spread"]:.0e}); its direction turns with the link'
-        ),
+        'proportional within {S_a_departure:.0e} and equally large along the seam (spread '
+        '{S_a_spread:.0e}); its direction turns with the link',
         ('S_a_departure', 'S_a_spread'),
     ),
     Rule(
@@ -272,10 +253,8 @@ _RULES: tuple[Rule, ...] = (
         'The effect of a link length scales with its place in the chain',
         'V.iii',
         lambda m: m['S_a_max'] - m['S_a_min'] > 0.01,
-        lambda r: (
-            f'S_a is {r["S_a_max"]:.3f} for every link of every robot: a longer link moves '
-            'all that follows by as much'
-        ),
+        'S_a is {S_a_max:.3f} for every link of every robot: a longer link moves all that '
+        'follows by as much',
         ('S_a_min', 'S_a_max'),
     ),
     Rule(
@@ -283,12 +262,10 @@ _RULES: tuple[Rule, ...] = (
         'A high condition number of J means high sensitivity to joint errors',
         'II.ii',
         lambda m: m['condition_rank'] > 0.5 and m['condition_rank_anywhere'] > 0.5,
-        lambda r: (
-            f'rank correlation of condition number and gain: along these seams '
-            f'{r["condition_rank"]:.2f}, as both grow while the arm stretches; over random postures '
-            f'{r["condition_rank_anywhere"]:.2f}: the condition number compares directions, the gain '
-            'amplifies'
-        ),
+        'rank correlation of condition number and gain: along these seams '
+        '{condition_rank:.2f}, as both grow while the arm stretches; over random postures '
+        '{condition_rank_anywhere:.2f}: the condition number compares directions, the gain '
+        'amplifies',
         ('condition_rank', 'condition_rank_anywhere', 'condition_max', 'gain_max'),
         'the arm stretches, so that both grow',
         lambda m: m['condition_rank'] > 0.5,
@@ -298,12 +275,10 @@ _RULES: tuple[Rule, ...] = (
         'Combined errors deviate more than the sum of the single ones',
         'IV.vi, V.vi',
         lambda m: m['combined_exceeds'] > 0.5,
-        lambda r: (
-            f'the triangle inequality forbids it to first order: peak over sum '
-            f'{r["combined_ratio_median"]:.2f} (median of 200 draws), at most '
-            f'{r["combined_ratio_max"].high:.3f}; the coupling of errors is '
-            f'{r["coupling"] * 100.0:.2f} % of the deviation'
-        ),
+        'the triangle inequality forbids it to first order: peak over sum '
+        '{combined_ratio_median:.2f} (median of 200 draws), at most '
+        '{combined_ratio_max.high:.3f}; the coupling of errors is {coupling.percent:.2f} % of '
+        'the deviation',
         ('combined_ratio_median', 'combined_ratio_max', 'combined_exceeds', 'coupling'),
     ),
     Rule(
@@ -311,11 +286,9 @@ _RULES: tuple[Rule, ...] = (
         'Cumulative drift of angular errors is linear in the path length',
         'V.vi',
         lambda m: abs(m['drift_exponent_angular'] - 1.0) < 0.05,
-        lambda r: (
-            f'D_cum grows with the power {r["drift_exponent_angular"]:.2f} of the path: it '
-            f'is a sum of deviations that differ along the seam by '
-            f'{r["drift_spread_angular"] * 100.0:.0f} %, not an accumulation'
-        ),
+        'D_cum grows with the power {drift_exponent_angular:.2f} of the path: it is a sum of '
+        'deviations that differ along the seam by {drift_spread_angular.percent:.0f} %, not an '
+        'accumulation',
         ('drift_exponent_angular', 'drift_spread_angular'),
         'the lever arms change little along the seam',
         lambda m: (
@@ -327,11 +300,8 @@ _RULES: tuple[Rule, ...] = (
         'Combined errors make the drift grow faster than the path',
         'V.vi',
         lambda m: m['drift_exponent_combined'] > 1.05,
-        lambda r: (
-            f'power of the path length: combined {r["drift_exponent_combined"]:.2f}, '
-            f'angular {r["drift_exponent_angular"]:.2f}, '
-            f'initialization {r["drift_exponent_init"]:.2f}'
-        ),
+        'power of the path length: combined {drift_exponent_combined:.2f}, angular '
+        '{drift_exponent_angular:.2f}, initialization {drift_exponent_init:.2f}',
         ('drift_exponent_combined', 'drift_exponent_angular', 'drift_exponent_init'),
     ),
     Rule(
@@ -339,14 +309,11 @@ _RULES: tuple[Rule, ...] = (
         'Angular errors > backlash > link length > initialization',
         'V.vii',
         lambda m: bool(m['rank_holds']),
-        lambda r: (
-            f'total indices on the stated tolerances: angular {r["ST_angular"]:.2f}, '
-            f'backlash {r["ST_backlash"]:.2f}, length {r["ST_length"]:.2f}, initialization '
-            f'{r["ST_initial"]:.2f}; tolerances changed by up to 3 leave the order in '
-            f'{r["rank_share"] * 100.0:.0f} % of cases; per degree and mm it is '
-            f'{r["unit_angular"]:.1f} > {r["unit_backlash"]:.1f} > {r["unit_length"]:.0f} = '
-            f'{r["unit_initial"]:.0f}'
-        ),
+        'total indices on the stated tolerances: angular {ST_angular:.2f}, backlash '
+        '{ST_backlash:.2f}, length {ST_length:.2f}, initialization {ST_initial:.2f}; '
+        'tolerances changed by up to 3 leave the order in {rank_share.percent:.0f} % of cases; '
+        'per degree and mm it is {unit_angular:.1f} > {unit_backlash:.1f} > {unit_length:.0f} '
+        '= {unit_initial:.0f}',
         (
             'ST_angular',
             'ST_backlash',
@@ -417,5 +384,5 @@ def _decide(rule: Rule, cases: Sequence[_Measured]) -> Claim:
     elif rule.holds_then is not None and all(rule.holds_then(case) for case in cases):
         verdict = f'{_HOLDS_WHEN} {rule.condition}'
     measured = {key: (ranges[key].low, ranges[key].high) for key in rule.shows}
-    told = rule.key, rule.statement, rule.where, verdict, rule.reason(ranges)
+    told = rule.key, rule.statement, rule.where, verdict, rule.reason.format_map(ranges)
     return Claim(*told, held, len(cases), measured)

@@ -15,15 +15,9 @@ from weld_twin_core.effects.geometry import JointOffset
 from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.motion.profiles import Constant
-from weld_twin_core.sensitivity import (
-    Sizes,
-    Study,
-    arc_weights,
-    expected_deviation,
-    posture,
-    study_of_plan,
-)
-from weld_twin_core.sensitivity.sweep import DEGREE
+from weld_twin_core.sensitivity import Study, expected_deviation, study_of_plan
+from weld_twin_core.sensitivity.local import arc_weights, posture
+from weld_twin_core.sensitivity.sweep import DEGREE, Sizes
 
 from ..setting import RECORDED, Setting, recorded_deviations
 from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, plain_powers, svg

@@ -11,18 +11,20 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.sensitivity import (
     Study,
-    arc_weights,
-    cumulative,
     default_tolerances,
     default_values,
-    exact_deviations,
+    sweep,
+)
+from weld_twin_core.sensitivity.claims.measures import growth_exponent
+from weld_twin_core.sensitivity.evaluate import exact_deviations
+from weld_twin_core.sensitivity.local import arc_weights
+from weld_twin_core.sensitivity.sweep import (
+    DEGREE,
+    cumulative,
     scenario_deviations,
     spread_of_passes,
-    sweep,
     together,
 )
-from weld_twin_core.sensitivity.claims.combined_measures import growth_exponent
-from weld_twin_core.sensitivity.sweep import DEGREE
 
 from ..setting import Setting
 from .canvas import COLOURS, Drawing, from_zero, label, legend, panels, plain_powers, svg

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modules that lie elsewhere now: their old names go on for one release, and say the new ones."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ command runs in a fork of this process, within bounds of memory and computing ti
 crash included, ends with it. Whoever asked and is gone takes the command along.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import io

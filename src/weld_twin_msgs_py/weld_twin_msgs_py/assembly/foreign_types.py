@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of other types than the table of topics has, as the messages that they stand for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names of the frames in message headers, and which frame of ours each of them means."""
 
-from __future__ import annotations
-
 from os.path import commonprefix
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages to rows of numbers, each stream in the order of its stamps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import Enum
 from math import hypot, isfinite, nan

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint states of whatever controller: any order, further joints, spread over publishers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from math import inf, isfinite
 from operator import ge, itemgetter, le, sub

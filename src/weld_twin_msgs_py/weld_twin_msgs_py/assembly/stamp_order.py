@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stamps that must go forward, without being lost for good after a restart."""
 
-from __future__ import annotations
-
 from weld_twin_core.errors import DataError
 
 RESTART_AFTER = 10

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames as `/tf` and `/tf_static` tell them, with or without tf2: a tree, and the ways in it."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterator

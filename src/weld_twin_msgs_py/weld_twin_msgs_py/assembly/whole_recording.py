@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Streams of rows to a `Recording`, of static stations or of a motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag to a `Recording`: every message through the assembly that the running nodes use."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cameras saw in a bag: one message of points for every image of a camera."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

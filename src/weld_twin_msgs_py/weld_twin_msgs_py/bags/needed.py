@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a bag lacks for a diagnosis and how to mend it, and whether it is whole, in the same words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

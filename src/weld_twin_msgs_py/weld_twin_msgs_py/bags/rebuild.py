@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag from what is whole of another: of one whose recorder died, or that was damaged since."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -8,8 +8,6 @@ finite. Such a topic is read as columns; whatever is not as usual in any message
 reader that takes them one by one, so that both give the same samples and the same refusals.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

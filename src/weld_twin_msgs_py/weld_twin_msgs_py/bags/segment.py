@@ -9,8 +9,6 @@ mcap get the checksum rosbags leaves out: after a power cut a file may have its 
 content, and only a checksum tells.
 """
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

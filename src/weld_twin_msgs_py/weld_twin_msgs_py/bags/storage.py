@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a path to a bag stands for: its storage files, and what is said about them."""
 
-from __future__ import annotations
-
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A `Recording` to a bag with the standard topics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from heapq import merge

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A YAML file that describes what is touched."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from weld_twin_core.contacts import Artefact

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables as text that spreadsheets open: a name in them is never a formula."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Sequence

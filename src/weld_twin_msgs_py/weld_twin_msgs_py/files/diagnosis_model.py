@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The model of a diagnosis file: fitted frames, effects given, effects found."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

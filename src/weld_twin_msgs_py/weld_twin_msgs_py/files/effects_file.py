@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects files: a YAML list of effects."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from pathlib import Path

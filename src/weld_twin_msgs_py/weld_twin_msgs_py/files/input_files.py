@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which data a result comes from: names and hashes of the inputs."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How sure instruments are of a point, as their data sheets or certificates say it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import NamedTuple

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint motion files: stations or a trajectory in joint positions, as a diagnosis proposes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

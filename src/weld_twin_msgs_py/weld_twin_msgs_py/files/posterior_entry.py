@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The entry ``posterior`` of a diagnosis file: how sure its model is of a pose."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """JSON Schemas of the files that people write, described from the classes that read them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any

@@ -7,8 +7,6 @@ Who works in one holds a lock on a file in it. The system lets go of the lock wh
 however it ends, so a directory whose lock is free is nobody's any more.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that appear whole or not at all: texts, and JSON with null for what is not finite."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

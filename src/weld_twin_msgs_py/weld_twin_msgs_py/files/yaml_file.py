@@ -8,8 +8,6 @@ of the last one winning, and aliases are refused because a few lines of them can
 gigabytes.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Hashable

@@ -7,8 +7,6 @@ Against the middleware's typed take, bytes that are no message become a sentence
 costs a tenth of the time. The objects have the names and fields of the standard types.
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from struct import Struct, error, unpack_from

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arrays to serialised messages: with message objects it takes seven times as long."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from struct import Struct, pack
 from typing import ClassVar

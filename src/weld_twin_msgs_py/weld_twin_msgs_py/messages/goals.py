@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint trajectories of action goals to points of a robot, and corrected points back into them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any, NamedTuple

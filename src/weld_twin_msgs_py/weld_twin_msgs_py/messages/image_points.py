@@ -8,8 +8,6 @@ them: clockwise from the upper left, as OpenCV does. The detector of AprilTags (
 counts them against the clock from the lower left.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

@@ -7,8 +7,6 @@ A robot that moves sends the same message again and again: frame, names and coun
 numbers change, at places of plain CDR (DDSI-RTPS 2.5, section 10) that the first message tells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which frames hold where a program branches or goes round: nobody knows which way it takes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 

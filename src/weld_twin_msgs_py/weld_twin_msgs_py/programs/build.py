@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is understood of a program: points with the places of their numbers, moves and postures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

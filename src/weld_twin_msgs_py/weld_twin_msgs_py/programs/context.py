@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a reader of programs is given besides the text."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple, NoReturn
 

@@ -12,8 +12,6 @@ E3 of the arm's group and the joints of further groups. No file of a program say
 robot file is which, so a user says it. All count as the joint does, or the other way round.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -14,8 +14,6 @@ name: ``_deg``, ``_mm``, ``[deg]``, ``[mm]``. Poses: ``x y z`` [m] with ``qx qy 
 Lines that begin with ``#`` are comments.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from itertools import pairwise

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of languages: which there are, how a file tells its own, who reads it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from contextlib import suppress

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the readers of all languages share: a text with its comments blanked out, gone through once."""
 
-from __future__ import annotations
-
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence

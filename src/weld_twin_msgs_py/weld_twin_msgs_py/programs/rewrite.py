@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program written again with other points: only the digits of those points change."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Sequence
 

@@ -15,8 +15,6 @@ A about z, B about the new y and C about the new x is the same turn as C, B, A a
 and z, so KUKA, FANUC and Yaskawa differ in the order of the numbers alone.
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_left
 from collections.abc import Callable, Sequence

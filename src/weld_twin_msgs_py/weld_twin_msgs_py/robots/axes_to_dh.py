@@ -15,8 +15,6 @@ References
 
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

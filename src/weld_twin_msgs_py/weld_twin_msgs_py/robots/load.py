@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot from what the user names: a bundled model, a file, or one of one's own by its name."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A corrected robot in the URDF it came from: every name, mesh and limit stays, origins move."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A URDF chain to an exact standard Denavit-Hartenberg robot; numbers in wrong units are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The part of a URDF that matters here and is parsed: joints, their frames, and link masses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, ParseError

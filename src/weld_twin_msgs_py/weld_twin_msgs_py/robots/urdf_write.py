@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot to a URDF whose frames are exact, such as a corrected model for the controller."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring

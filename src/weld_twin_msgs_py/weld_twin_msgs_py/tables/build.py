@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table to a recording of stations or of a motion, with every assumption put into words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that describe cameras (camera_info as ROS writes it) and targets (points, or a board)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table of joint angles and what was touched, English or German, to a recording of stations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

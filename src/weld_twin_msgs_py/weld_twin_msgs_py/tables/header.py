@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which column is what, from the names in the header."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The joint columns of a table: each in its unit, counted as the model counts them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple

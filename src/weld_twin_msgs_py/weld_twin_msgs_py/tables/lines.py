@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Delimited text as header and rows, and numbers as people and spreadsheets write them."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections import Counter

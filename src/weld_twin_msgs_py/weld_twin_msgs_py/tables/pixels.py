@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table of joint angles and what cameras saw, in pixels, to a recording of stations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -8,8 +8,6 @@ or the probe, so the table can be compared with the arm's kinematics before any 
 The true convention agrees to the arm's accuracy, the others by tens of degrees.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log of the joints and a table of the instrument, brought together by time or row by row."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a table does not tell, guessed from its numbers: units, what its clock is good for, agreement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from functools import partial

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Words in the headers of tables, English and German, and what a user may say about a table instead."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Sequence

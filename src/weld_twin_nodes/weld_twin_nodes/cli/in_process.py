@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line run in this process, as a test or a notebook wants it."""
 
-from __future__ import annotations
-
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from typing import NamedTuple

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that several commands share, as tables that `parsing` reads; `given` says what they mean."""
 
-from __future__ import annotations
-
 ROBOT = """
 --robot R, required      a robot of 'weld-twin bag --robots', a robot file or a URDF
 chain of a URDF:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A trajectory controller that stands in for a cell's own: it tells its joint states as it goes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node as a process of its own, with its parameters and its log, in a domain of the cell alone."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

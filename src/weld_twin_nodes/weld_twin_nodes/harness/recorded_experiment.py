@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An experiment recorded in a running cell: the generator moves, the recorder writes."""
 
-from __future__ import annotations
-
 import subprocess
 import tempfile
 from collections.abc import Mapping

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes there are, by name, and what each takes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays a bag into the running nodes, for machines without `ros2 bag`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node of the cell shares: settings, a robot, guarded inputs, outputs, and its end."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

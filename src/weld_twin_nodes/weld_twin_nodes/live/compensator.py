@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compensator: moves poses and trajectory goals so that the real tool goes where they mean."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Sequence

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the nodes beside a recorder tell: what they sent, and robot, effects and seed they work with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, NamedTuple

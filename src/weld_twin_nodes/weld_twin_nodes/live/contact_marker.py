@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The marking node: the present joints as a contact, when somebody says that the tool touches."""
 
-from __future__ import annotations
-
 import csv
 import time
 from functools import partial

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Deviation analyzer: measured minus twin, paired by header stamp, and its metrics."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from functools import partial

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The marker node: the seam coloured by deviation, and the deviations magnified."""
 
-from __future__ import annotations
-
 from collections import OrderedDict, deque
 from functools import partial
 from typing import Any, ClassVar

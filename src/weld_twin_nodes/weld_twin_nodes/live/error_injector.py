@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Error injector: the stand-in for the real cell, moving as the injected effects have it."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, ClassVar
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forward-kinematics twin: where the model, with the effects known so far, has the tool."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals worked out beside a node, so that it serves poses meanwhile, and what became of each."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from concurrent.futures import Future, wait

@@ -7,8 +7,6 @@ A goal is accepted when the controller has accepted what became of it. The answe
 room for a reason; it is reported in the log, on `/diagnostics` and in the audit.
 """
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a node is doing: what each input brought and each output sent, as diagnostic statuses."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections import deque

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Live diagnosis: the verdict over the last minute of the cell, once there is evidence for one."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence

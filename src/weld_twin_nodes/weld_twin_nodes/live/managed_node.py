@@ -7,8 +7,6 @@ The standard services are offered here, not by rclpy's mixin: that one serves no
 transition is over, and ends a node that is asked for one which its state does not have.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from functools import partial

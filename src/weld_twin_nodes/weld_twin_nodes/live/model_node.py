@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the injector and the twin share: a robot, effects that can be changed, a joint stream."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar

@@ -6,8 +6,6 @@ What each node says, hears, answers and asks: the one table of it, and the SROS2
 A test holds it to what the running nodes open. Names without a slash lie in the node's namespace.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr

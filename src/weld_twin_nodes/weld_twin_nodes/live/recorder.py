@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorder: what topics carry, as a bag with its provenance, and what it lacks."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Collection, Sequence

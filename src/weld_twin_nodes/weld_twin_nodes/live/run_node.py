@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Running a node as a program: one loop that Ctrl-C and SIGTERM always end."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 import re

@@ -7,8 +7,6 @@ Quality of service comes from a parameter file, as other nodes of ROS 2 take it:
 ``qos_overrides./joint_states.subscription.reliability: reliable`` and the like.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches

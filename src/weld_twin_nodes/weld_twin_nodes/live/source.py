@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A subscription that follows its publishers: in the type they have, and in what they offer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

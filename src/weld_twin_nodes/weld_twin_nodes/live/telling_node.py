@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node that tells how it is doing, and what its inputs lack: in its log, and on `/diagnostics`."""
 
-from __future__ import annotations
-
 import time
 from abc import abstractmethod
 from collections import deque

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node knows of the frames on `/tf`: where the base is, and the way of a measurement."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans a seam and publishes it as joint states, in real time or as fast as the listeners keep up."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection
 from functools import partial

@@ -6,8 +6,6 @@ What a node of the project tells of itself once a second, in the values of its h
 Whom it reaches and what it sent only a node itself knows: others have graphs of their own.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections import deque

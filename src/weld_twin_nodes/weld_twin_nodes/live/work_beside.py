@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work that a node hands to a thread, and that cannot keep it from its end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Future
 from queue import SimpleQueue

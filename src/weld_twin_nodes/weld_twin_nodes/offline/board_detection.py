@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The corners of a board in images, as OpenCV finds them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A name for the content of values: equal content, equal name, on every machine."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass

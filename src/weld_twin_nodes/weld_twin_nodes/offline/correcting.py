@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot program corrected by a model file: what is read, what is changed, what is reported."""
 
-from __future__ import annotations
-
 import hashlib
 import time
 from collections.abc import Mapping, Sequence

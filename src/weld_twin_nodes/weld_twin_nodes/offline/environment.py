@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Variables of the environment: set for a block, and those that keep linear algebra on one core."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A seam or an experiment as the moves of a program that a controller runs."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The model of a diagnosis as robots, planners and people load it, and where it holds, in sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

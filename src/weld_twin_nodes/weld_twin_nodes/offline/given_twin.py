@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A twin, and cameras, as parameters and the command line describe them: files and texts."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

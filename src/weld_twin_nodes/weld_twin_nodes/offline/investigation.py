@@ -8,8 +8,6 @@ all recordings are diagnosed together, and the experiments without the first one
 answers like it were right; the other speaks for it or against it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import exp, log
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A first measurement: how many stations, which, and the files to make it with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -9,8 +9,6 @@ whole, the change is decided: who is killed while files are moved into place has
 by the next one who works in the folder. docs/folders.md says more.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

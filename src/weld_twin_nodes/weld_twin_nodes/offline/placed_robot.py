@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot placed where a recording was measured, so that commands and measurements compare."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin with identified effects over a whole recording, and commands corrected by it."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Mapping, Sequence

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A region that people choose, as postures: a box, a program, or a recorded motion."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A seam named on the command line or by a parameter, planned for a robot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

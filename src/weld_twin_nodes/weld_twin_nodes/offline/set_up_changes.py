@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person changed in the cell for one recording, for the diagnosis of several."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole cell offline: what the live nodes publish for a motion, in bulk, and as a bag."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

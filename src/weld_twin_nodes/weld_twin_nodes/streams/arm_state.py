@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where an arm stands by its joint states, whether it moves, and where its joints came from."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 

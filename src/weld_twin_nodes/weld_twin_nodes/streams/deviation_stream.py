@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured minus twin, paired by header stamp: what the analyzer computes, live or afterwards."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import deque

@@ -7,8 +7,6 @@ A thread would not do: whoever holds the interpreter keeps the poses waiting. Ru
 that process, which ends when nobody holds the other end of its socket any more.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stream of poses on its way to a controller: when it is corrected, and that it never jumps."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

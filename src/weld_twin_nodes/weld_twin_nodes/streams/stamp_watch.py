@@ -8,8 +8,6 @@ behind the time a message takes on its way; they show in the motion: the measure
 twin, shifted in time.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from typing import NamedTuple
 

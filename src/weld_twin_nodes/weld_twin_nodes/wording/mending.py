@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What mending one cause or several leaves, and where that would make the seam worse."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from itertools import combinations
 from typing import NamedTuple

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers with units as people read them: mm, mrad, ms; SI stays inside."""
 
-from __future__ import annotations
-
 from math import floor, isfinite, log10, pi
 from typing import Any
 

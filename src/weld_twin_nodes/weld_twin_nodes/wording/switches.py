@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The causes that a reader can think away."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict in two sentences: the cause, and what knowing it brings."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

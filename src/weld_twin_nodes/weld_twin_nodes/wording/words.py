@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis in plain sentences."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 

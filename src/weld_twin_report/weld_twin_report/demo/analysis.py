@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The steps of the demo: live nodes recorded, what was recorded analysed and diagnosed, handed over."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop closed: the same seam on the same arm, as it is and through the compensator."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

@@ -6,8 +6,6 @@ The steps of the demo in their order.
 A step more is an entry of `STEPS`: a title and a function of the job, and of what tells progress.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of one cell: what changed, its control charts, its last diagnoses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from typing import Any, NamedTuple

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of all cells, the worst first."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

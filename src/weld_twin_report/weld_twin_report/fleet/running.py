@@ -8,8 +8,6 @@ instant costs what was running then, and nothing else. What a database cannot ta
 written as soon as it can.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

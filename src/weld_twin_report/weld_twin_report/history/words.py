@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed in a cell over time, and the words for it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from math import isfinite

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pass, fail, or 'cannot be said': the deviation against a tolerance, by ISO 14253-1."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What more than one place of page, terminal and print says of a diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is said of one cause, wherever it is said: card, table of causes, terminal."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cached_property

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The causes: each on a card, largest share of the gap first, and for engineers what was considered."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ uPlot draws them, with ticks, hover values and linked cursors; it is embedded, s
 page with charts passes ``charts=True`` to `html.document`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from math import isfinite

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Circles as a magnified polar plot, like ISO 230-4 has them, with the reversals of the joints."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The clouds of the predicted tool point about every contact, before and after, magnified."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

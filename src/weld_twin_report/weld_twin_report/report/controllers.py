@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a controller takes a correction, in the words of its menus and the numbers that it wants."""
 
-from __future__ import annotations
-
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.frame_errors import RootPose

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files a diagnosis leaves behind, the page as a PDF to sign among them."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

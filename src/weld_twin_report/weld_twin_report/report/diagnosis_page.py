@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sheet of a diagnosis: one HTML file that needs nothing else, and prints on a side or two."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the answer stands on and where to go from it: on the page, and on the print to be signed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the gap lies: the joint x regressor map, joints, regimes, directions, stretches."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

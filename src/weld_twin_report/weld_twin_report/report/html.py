@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Markup from values: whatever is not markup already is escaped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from html import escape

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of an investigation: the way from what was believed to what came back, as a tree."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any

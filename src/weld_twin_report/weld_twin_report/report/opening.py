@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first screen: the verdict, and what a fitter asks first: how far off, may we weld, what to do."""
 
-from __future__ import annotations
-
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets

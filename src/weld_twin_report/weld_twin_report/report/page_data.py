@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page of a diagnosis draws from, and the three directions that it speaks of everywhere."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

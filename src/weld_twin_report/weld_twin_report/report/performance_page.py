@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An ISO 9283 evaluation: its rows of text, for page and terminal, and its page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

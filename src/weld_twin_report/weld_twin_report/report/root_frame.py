@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a positioner stands, in the numbers that its controller takes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The seam in space, coloured by deviation, as it is and with what is thought mended."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis

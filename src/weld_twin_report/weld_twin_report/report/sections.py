@@ -11,8 +11,6 @@ A section is a function from what it may draw from to markup, in a file of this 
 Files whose name ends in ``_page`` are pages of their own and have no sections of this one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis on the terminal: the verdict, what was found, what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from rich.console import Console

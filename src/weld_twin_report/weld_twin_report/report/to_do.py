@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do, in its order, and what could not be tried: on the page and on the terminal."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any

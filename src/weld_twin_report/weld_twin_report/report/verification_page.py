@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was promised and what was measured after a correction: in lines, and as a page to keep."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tolerances in the words of who fits and masters the robot: what to do, to what, and its gain."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from math import degrees, sqrt

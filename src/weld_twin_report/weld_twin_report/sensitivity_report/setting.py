@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a sensitivity study is asked: robot, seam or recording, tolerances, how much to run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A study run, and its files, each written whole; one that was stopped finds its results again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study as one HTML file that needs nothing else."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Sequence
 from typing import Any

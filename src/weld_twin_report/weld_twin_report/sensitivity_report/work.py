@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sensitivity study as tasks, functions of plain arguments to plain data, and the tree they make."""
 
-from __future__ import annotations
-
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The application: addresses and what answers them."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import shutil

@@ -7,8 +7,6 @@ A server works only in a directory that is new, empty, or marked by an earlier o
 that is locked while a server runs; the system lets go of it when its process ends, however it ends.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fields of the forms: each is an option of a command, under a title that somebody understands."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple

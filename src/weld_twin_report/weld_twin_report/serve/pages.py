@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of the server, made there; none needs a script."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files

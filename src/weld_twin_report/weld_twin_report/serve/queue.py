@@ -7,8 +7,6 @@ Everything is in the folders of the jobs: a server that was killed finds there w
 what was not, and goes on. No job and no full disk ends a worker.
 """
 
-from __future__ import annotations
-
 import shutil
 import sys
 import threading

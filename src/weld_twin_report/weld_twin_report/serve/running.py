@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The server started, and ended; what running nodes say beside it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

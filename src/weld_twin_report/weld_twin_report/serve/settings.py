@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a server may do and how much it takes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """C3D of motion capture: markers of any maker."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from pathlib import Path

@@ -6,8 +6,6 @@ Current positions of a FANUC controller, ``MD:CURPOS.DG``, one after the other i
 The controller makes it by FTP or web page. Where it takes its own tool to be is no measurement.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

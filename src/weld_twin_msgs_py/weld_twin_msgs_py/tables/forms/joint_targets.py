@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Targets of joints in RAPID: a list of postures, and no program of moves."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Traces of KUKA: a text, ``.dat``, in the form of DIAdem, and files of values beside it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ Lists of points: names, then x, y, z, as SpatialAnalyzer and others write them, 
 A comparison has two points to a name, and often what they differ by, which tells them apart.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 

@@ -8,8 +8,6 @@ returns the exit code and raises a TwinError for anything the user can mend. A m
 command runs, not for its help. Options that few need are rare: `--help` fits on one screen without them.
 """
 
-from __future__ import annotations
-
 from ..options import (
     BAG_OUTPUT,
     CAMERAS,

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find a board in images, and write the table that `import` reads."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from weld_twin_core.errors import DataError

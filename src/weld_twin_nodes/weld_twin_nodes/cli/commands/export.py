@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What other software loads: a corrected model, a robot program, a policy, a schema."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path

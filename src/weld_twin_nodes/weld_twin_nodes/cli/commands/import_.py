@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make a bag of a table of what was measured, seen or touched."""
 
-from __future__ import annotations
-
 from weld_twin_core.contacts import spreads
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation_metrics

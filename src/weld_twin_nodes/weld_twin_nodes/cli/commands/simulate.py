@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag of a seam, or of the twin of a recording."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from weld_twin_core.errors import DataError

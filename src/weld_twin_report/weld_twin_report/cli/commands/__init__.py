@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands that write pages; `weld_twin_nodes.cli.commands` says what a row and a module here have."""
 
-from __future__ import annotations
-
 from weld_twin_nodes.cli.options import (
     ALIGN,
     ANY_ROBOT,

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Correct a robot program, or the joint commands of a bag."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from weld_twin_core.errors import DataError

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole job on an example."""
 
-from __future__ import annotations
-
 from weld_twin_core.errors import TwinError
 from weld_twin_nodes.cli.given import Given
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Say where the gap lies, what causes it, how far it shrinks."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence

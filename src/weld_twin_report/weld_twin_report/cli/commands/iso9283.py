@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pose and path accuracy and repeatability by ISO 9283."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from rich.console import Console

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The diagnosis in a browser."""
 
-from __future__ import annotations
-
 import secrets
 from dataclasses import replace
 from pathlib import Path

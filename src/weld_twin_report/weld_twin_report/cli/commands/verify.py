@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Was the promise of a correction kept?"""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The figures of the study: a table, a picture and a sentence each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from weld_twin_core.errors import DataError

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures 6 to 9, along the path, and those beyond the paper: posture, and what was recorded."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures 10 to 14: deviation over the size of one error, and all errors together."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

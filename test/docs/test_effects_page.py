@@ -12,8 +12,8 @@ import yaml
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import REGISTRY, Effect, JointOffset, effects_from_list
-from weld_twin_core.effects.apart import ELSE, way
 from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
+from weld_twin_core.effects.registry import ELSE, way
 from weld_twin_core.twin.twin import Twin
 
 DOCS = Path(__file__).parents[2] / 'docs'

@@ -81,7 +81,7 @@ DIAGNOSED = """
     from range_rows import cause_rows, effect_rows
     from small_arm import small_arm
     from weld_twin_core.diagnosis.result import NAMING
-    from weld_twin_core.effects.apart import way
+    from weld_twin_core.effects.registry import way
     from weld_twin_lab.blind.cause_sizes import FAMILIES
     from weld_twin_report.history.words import likely
     from weld_twin_report.report.diagnosis_page import report_page

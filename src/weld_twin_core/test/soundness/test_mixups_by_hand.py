@@ -33,7 +33,7 @@ from weld_twin_core.diagnosis.soundness.stamps import streams
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions
 from weld_twin_core.effects import JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
-from weld_twin_core.effects.frame_errors import ToolPose
+from weld_twin_core.effects.geometry import ToolPose
 from weld_twin_core.recording import JointMotion
 
 ELBOW_TURNED = [1, 1, -1, 1, 1, 1]

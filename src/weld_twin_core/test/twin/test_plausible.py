@@ -18,7 +18,7 @@ from weld_twin_core.effects import (
     effects_from_list,
     register,
 )
-from weld_twin_core.effects.payload import mass_range
+from weld_twin_core.effects.loads import mass_range
 from weld_twin_core.effects.plausible import beyond, plausible, ranges, spreads, table
 from weld_twin_core.errors import ModelError
 

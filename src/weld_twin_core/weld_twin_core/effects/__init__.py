@@ -1,9 +1,9 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The vocabulary of effects: one physical cause per file, one definition for every use.
+The vocabulary of effects: physical causes, each defined once for every use.
 
-Importing this package registers the effect of every file in it; user code adds its own with
+Importing this package registers the effects of every file in it; user code adds its own with
 `register`.
 Every effect is a frozen dataclass. Its fields are the parameters that the page of effects lists,
 in SI units; effects of a joint or a link take the name of the joint first.
@@ -20,33 +20,32 @@ Examples
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .axis_compliance import AxisCompliance
 from .backlash import Backlash, LoadedPlay, Stiffening
 from .bearing_tilt import BearingTilt
-from .cartesian_compliance import CartesianCompliance
-from .clocks import ClockRate, TimeDelay
+from .compliance import AxisCompliance, CartesianCompliance, JointCompliance, PedestalTilt, ToolSag
 from .curves import FrameCurve, JointCurve
 from .dated import InstrumentKnock, JointSlip, SetupSettling, SetupStep, ToolSlip
-from .drift import Drift
 from .effect import Effect, LinearEffect, MemoryEffect
-from .frame_errors import BasePose, RootPose, ToolPose
-from .friction import Friction
 from .gear_ratio import GearRatio, GearRatioByDirection
-from .geometry import AxisParallelism, JointOffset, LinkLength, LinkOffset, LinkTwist
+from .geometry import (
+    AxisParallelism,
+    BasePose,
+    JointOffset,
+    LinkLength,
+    LinkOffset,
+    LinkTwist,
+    RootPose,
+    ToolPose,
+)
 from .guide import GuideBend, GuideTilt
-from .hose_pull import HosePull
-from .hysteresis import Hysteresis
-from .joint_compliance import JointCompliance
+from .instrument import ClockRate, Drift, MeasurementNoise, MeasurementScale, Refraction, TimeDelay
 from .joint_coupling import JointCoupling
-from .measurement import MeasurementNoise, MeasurementScale
-from .payload import Payload
-from .pedestal_tilt import PedestalTilt
+from .loads import HosePull, Payload
 from .quantization import Quantization
-from .refraction import Refraction
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
+from .rubbing import Friction, Hysteresis
 from .servo_lag import ServoLag
 from .thermal import LinkWarmUp, ThermalGrowth
-from .tool_sag import ToolSag
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
 from .view import Parameter, Plausible, Stage, View

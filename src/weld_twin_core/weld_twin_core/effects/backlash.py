@@ -41,10 +41,10 @@ from numpy.typing import NDArray
 
 from ..errors import ModelError
 from .associative_scan import last_true, play
+from .compliance import JointCompliance
 from .curves import load
 from .effect import Effect, LinearEffect, MemoryEffect, register
 from .hooks import FitHooks, Hooked, SearchHooks, Traits
-from .joint_compliance import JointCompliance
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import size
 

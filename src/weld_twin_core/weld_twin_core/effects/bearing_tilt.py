@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from .compliance import base_leans
 from .effect import Hooked, LinearEffect, SearchHooks, Traits, register
-from .pedestal_tilt import base_leans
 from .view import Array, Channel, Parameter, Robot, Shift, Stage, Value, View
 from .wording import turn
 

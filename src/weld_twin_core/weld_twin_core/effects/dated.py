@@ -20,8 +20,7 @@ import numpy as np
 
 from ..recording import Recording
 from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
-from .frame_errors import FrameError, frame_parameters
-from .geometry import ChannelError, JointOffset
+from .geometry import ChannelError, FrameError, JointOffset, frame_parameters
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 from .wording import base_frame, frame, radians
 

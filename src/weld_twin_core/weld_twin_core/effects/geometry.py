@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Constant errors of the geometry: a joint's zero, and the numbers of a Denavit-Hartenberg row.
+Constant errors: a joint's zero, the numbers of a Denavit-Hartenberg row, and where frames stand.
 
 The formulas are those of the paper: theta -> theta + offset (eq. II.iii.a), a -> a + da (eq. II.iii.b),
 alpha -> alpha + dalpha (eq. II.iii.c), d -> d + dd; beta is Hayati's turn about y for axes that are
@@ -10,14 +10,16 @@ nearly parallel (IEEE CDC 1983).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from .effect import LinearEffect, register
-from .view import Parameter, Robot, Shift, Stage, Value, View, single
-from .wording import metres, radians, stands, to_mend
+from ..arm.known_arms import controller_frames
+from ..arm.rotation import rotation_matrix, transform
+from .effect import Hooked, LinearEffect, SearchHooks, register
+from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View, single
+from .wording import base_frame, controller_pose, frame, metres, radians, stands, to_mend
 
 _URS = (
     'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
@@ -196,3 +198,169 @@ class AxisParallelism(_LinkError):
             (2e-3, 2e-2), 'derived: a tilt of the same kind as link_twist, of the same size'
         ),
     )
+
+
+def frame_parameters(
+    xyz: Plausible, rotvec: Plausible, typical: tuple[float, float] = (5e-4, 1e-3)
+) -> tuple[Parameter, ...]:
+    """Return the parameters of an error of a frame, with how large each may be."""
+    return (
+        Parameter('xyz', 'm', size=3, typical=typical[0], range=xyz),
+        Parameter('rotvec', 'rad', size=3, typical=typical[1], range=rotvec),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FrameError(LinearEffect):
+    """A constant error of the base or tool frame: a displacement and a turn."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+
+    channel: ClassVar[str]
+    of = 'robot'
+    stage = Stage.LINK
+
+    def per_unit(self, view: View) -> list[Shift]:
+        return [single((self.channel, k), np.ones(()), view) for k in range(6)]
+
+
+@register
+class BasePose(FrameError):
+    """The base is displaced by xyz in the world and turned by rotvec about its own origin."""
+
+    name = 'base_pose'
+    traits = replace(
+        FrameError.traits,
+        title='base pose error',
+        meaning='the robot stands elsewhere than its base frame says',
+        formula='R → exp(rotvec) R, origin → origin + xyz, world axes',
+        entered='base',
+        place='base',
+        fitted_with='base',
+    )
+    channel = 'base'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.5, 'derived: half a metre off is another place'),
+        Plausible.even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
+    )
+
+    def remedy(self, robot: Robot) -> str:
+        if robot.behind:
+            return self._on_the_workpiece(robot)
+        moved = base_frame(_of_the_origin(self.vector(), robot))
+        return (
+            f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
+            'moved: check the bolts of its foot.'
+        )
+
+    def _on_the_workpiece(self, robot: Robot) -> str:
+        """Return the same of a cell, where poses are measured in a frame that a positioner moves."""
+        now, step = robot.T_world_base, self.vector()
+        new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
+        before, after = (controller_pose(np.array(np.linalg.inv(pose))) for pose in (now, new))
+        return (
+            'Correct the frame on the workpiece: on the positioner it lies at '
+            f'{after} in place of {before}. If it was right '
+            'when it was measured, the fixture has moved, or another one is there.'
+        )
+
+
+def _of_the_origin(step: Array, robot: Robot) -> Array:
+    """Return the move of the base of the rows, (6,) [m, rad], as one of the controller's base."""
+    lever = robot.T_world_base[:3, :3] @ controller_frames(robot).base[:3, 3]
+    swing = rotation_matrix(step[3:]) @ lever - lever
+    return np.concatenate([step[:3] + swing, step[3:]])
+
+
+@register
+class ToolPose(FrameError):
+    """The tool point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
+
+    name = 'tool_pose'
+    traits = replace(
+        FrameError.traits,
+        title='tool pose error',
+        meaning='the tool is not where its tool frame says',
+        formula='R → R exp(rotvec), origin → origin + xyz, flange axes',
+        apart={
+            'base_pose': 'measure the tool by itself',
+        },
+        entered='tool',
+        place='tool',
+        changes_in_use=True,
+        fitted_with='tool',
+    )
+    channel = 'tool'
+    parameters = frame_parameters(
+        Plausible.even(
+            5e-3,
+            0.1,
+            'tool centres found by hand were 8 to 15 mm off (industrialmonitordirect.com, KR3 '
+            'mastering error)',
+        ),
+        Plausible.even(2e-2, 0.4, 'derived: twenty degrees are seen by the eye'),
+    )
+
+    def remedy(self, robot: Robot) -> str:
+        flange = controller_frames(robot).flange[:3, :3]
+        step = np.concatenate([flange.T @ self.vector()[:3], self.vector()[3:]])
+        moved = frame(step, 'of the flange', 'of the tool')
+        return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
+
+
+class _Search(SearchHooks):
+    def fits(self, robot: Robot, joint: str | None) -> bool:
+        return robot.behind > 0
+
+
+@register
+class RootPose(FrameError):
+    """The positioner is displaced by xyz along the robot's base axes, and turned about its root."""
+
+    name = 'root_pose'
+    traits = replace(
+        FrameError.traits,
+        title='root error of the positioner',
+        meaning='the positioner stands elsewhere than its root frame says',
+        formula="the positioner's foot in the robot's base: R → exp(rotvec) R, origin → origin "
+        "+ xyz, axes of the base of the robot's rows; of a cell with a positioner",
+        apart={
+            'joint_offset': 'measure where the positioner stands beside the robot (points on both '
+            'feet), or master the joint with its own gauge',
+        },
+        entered='root',
+        depends_on='constant',
+        place='base',
+        lacking='is of a positioner, and robot {robot!r} has none; use base_pose',
+    )
+    channel = 'root'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
+        Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
+    )
+    search = Hooked(_Search)
+
+    def stands(self, robot: Robot, base: Array) -> tuple[Array, Array]:
+        """
+        Return where the positioner's rows begin, as the robot file has it and as it is.
+
+        In a base (4, 4), itself in the frame where the robot's own rows begin; ``T_base_root``,
+        (4, 4) [m].
+        """
+        now, step = np.linalg.inv(robot.T_root_base), self.vector()
+        new = now.copy()
+        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
+        new[:3, 3] += step[:3]
+        there = np.linalg.inv(base)
+        return np.asarray(there @ now), np.asarray(there @ new)
+
+    def remedy(self, robot: Robot) -> str:
+        rows = robot.T_base_foot
+        step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
+        now, new = self.stands(robot, rows)
+        moved = frame(step, 'of the base', 'of the positioner')
+        return (
+            f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
+            f'stands at {controller_pose(new)} in place of {controller_pose(now)}.'
+        )

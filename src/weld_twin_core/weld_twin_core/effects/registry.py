@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The effects known by name, and effects from the entries of an effects file."""
+"""The effects known by name, from the entries of an effects file, and what parts look-alikes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..arm.robot import Robot
 from ..errors import DataError, ModelError
 from .effect import REGISTRY, Effect, register
 
-__all__ = ['REGISTRY', 'effect_from_mapping', 'effects_from_list', 'register']
+__all__ = ['ELSE', 'REGISTRY', 'effect_from_mapping', 'effects_from_list', 'register', 'way']
 
 
 def effect_from_mapping(entry: Mapping[str, Any]) -> Effect:
@@ -113,3 +113,18 @@ def _numbers(kind: type[Effect], key: str, value: Any) -> Any:
         wanted = {0: 'a number or a list', 1: 'one number'}.get(size, f'{size} numbers')
         raise ModelError(f'effect {kind.name!r}: {key} must be {wanted}, got {value!r}')
     return float(array) if array.ndim == 0 else array
+
+
+ELSE = 'mend whichever is easier, for anywhere in the workspace they differ by less than the noise'
+"""What is said of effects that move the tool alike on every motion, if they say nothing else."""
+
+
+def way(families: Sequence[str]) -> str:
+    """Return what tells causes of these families apart when no motion does."""
+    names = set(families)
+    for name in sorted(names & set(REGISTRY)):
+        (other,) = names - {name} if len(names) == 2 else {name}
+        way = REGISTRY[name].traits.apart.get(other)
+        if way and len(names) < 3:
+            return way
+    return ELSE

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
 from ..effects import REGISTRY, Effect
-from ..effects.frame_errors import FrameError
-from ..effects.geometry import ChannelError
+from ..effects.geometry import ChannelError, FrameError
 from ..errors import ModelError
 from ..twin.twin import Twin
 from .determining_samples import determining

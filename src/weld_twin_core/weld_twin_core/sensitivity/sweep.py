@@ -14,8 +14,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects import Effect
 from ..effects.backlash import Backlash
-from ..effects.frame_errors import BasePose
-from ..effects.geometry import JointOffset, LinkLength
+from ..effects.geometry import BasePose, JointOffset, LinkLength
 from .evaluate import exact_deviations
 from .seam_study import Study
 from .tolerance import Tolerance

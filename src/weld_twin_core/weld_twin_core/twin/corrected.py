@@ -14,9 +14,8 @@ from ..arm.chain import base_frame, root_frame, tool_frame
 from ..arm.robot import Robot
 from ..arm.rotation import transform
 from ..effects.effect import Effect
-from ..effects.frame_errors import FrameError
-from ..effects.geometry import ChannelError
-from ..effects.payload import Payload
+from ..effects.geometry import ChannelError, FrameError
+from ..effects.loads import Payload
 
 
 def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Effect, ...]]:

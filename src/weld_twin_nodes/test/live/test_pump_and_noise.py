@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from weld_twin_core.effects.measurement import MeasurementNoise
+from weld_twin_core.effects.instrument import MeasurementNoise
 from weld_twin_nodes.live.trajectory_generator import STALLED, Pump
 from weld_twin_nodes.streams.twin_stream import Noise
 

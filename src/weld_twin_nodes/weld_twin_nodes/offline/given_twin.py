@@ -12,8 +12,8 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.cameras import Camera, Target
 from weld_twin_core.effects import Effect, effects_from_list
+from weld_twin_core.effects.compliance import LOAD_OF_EFFORT
 from weld_twin_core.effects.dated import of_the_robot
-from weld_twin_core.effects.joint_compliance import LOAD_OF_EFFORT
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin

@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.effect import Stage
-from weld_twin_core.effects.measurement import MeasurementNoise
+from weld_twin_core.effects.instrument import MeasurementNoise
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake, Role, Taken

@@ -4,7 +4,7 @@
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects.effect import Effect
-from weld_twin_core.effects.frame_errors import RootPose
+from weld_twin_core.effects.geometry import RootPose
 from weld_twin_core.effects.wording import further
 
 BRANDS = {

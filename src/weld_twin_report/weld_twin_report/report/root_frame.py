@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects.frame_errors import RootPose
+from weld_twin_core.effects.geometry import RootPose
 from weld_twin_msgs_py.programs.controllers import world_of
 from weld_twin_msgs_py.programs.source import ABB_POSE, FANUC_POSE, KUKA_POSE, Notation
 

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.algebra.motions import REASON
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
-from weld_twin_core.effects.apart import ELSE, way
+from weld_twin_core.effects.registry import ELSE, way
 from weld_twin_core.metrics.conformity import PASS, Rule
 from weld_twin_nodes.wording.mending import look_at, remaining_without, warning
 from weld_twin_nodes.wording.quantities import millimetres

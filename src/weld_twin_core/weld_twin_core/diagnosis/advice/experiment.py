@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...effects.apart import way
 from ...effects.curves import JointCurve, basis
 from ...effects.effect import Effect
+from ...effects.registry import way
 from ...errors import TwinError
 from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from ...effects import REGISTRY
 from ...effects.dated import of_the_robot
 from ...effects.effect import Effect
-from ...effects.frame_errors import FrameError
-from ...effects.geometry import ChannelError
+from ...effects.geometry import ChannelError, FrameError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
 from ..algebra.fit import effect_precision, fit, frame_offset, trusted

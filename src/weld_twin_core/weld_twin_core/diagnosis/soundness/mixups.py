@@ -18,10 +18,16 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
+from ...effects.compliance import JointCompliance
 from ...effects.effect import Effect
-from ...effects.frame_errors import RootPose
-from ...effects.geometry import ChannelError, JointOffset, LinkLength, LinkOffset, LinkTwist
-from ...effects.joint_compliance import JointCompliance
+from ...effects.geometry import (
+    ChannelError,
+    JointOffset,
+    LinkLength,
+    LinkOffset,
+    LinkTwist,
+    RootPose,
+)
 from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
 from .lengths import falls, length, listed

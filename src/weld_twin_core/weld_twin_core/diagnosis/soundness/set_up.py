@@ -18,7 +18,7 @@ import numpy as np
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.dated import InstrumentKnock
-from ...effects.frame_errors import ToolPose
+from ...effects.geometry import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
 from .lengths import falls, length, listed

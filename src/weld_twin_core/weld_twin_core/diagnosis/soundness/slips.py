@@ -24,7 +24,7 @@ from scipy.special import ndtri
 from ...arrays import Array
 from ...effects.dated import InstrumentKnock, JointSlip, Sudden, ToolSlip
 from ...effects.effect import Effect
-from ...effects.measurement import MeasurementScale
+from ...effects.instrument import MeasurementScale
 from ...effects.plausible import spreads
 from ...recording import Recording
 from ...twin.features import Features

@@ -15,8 +15,15 @@ from ...arm.robot import Robot
 from ...arm.rotation import rotation_vector
 from ...arrays import Array, spread_over
 from ...effects.effect import Effect
-from ...effects.frame_errors import BasePose, RootPose, ToolPose
-from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
+from ...effects.geometry import (
+    BasePose,
+    JointOffset,
+    LinkLength,
+    LinkOffset,
+    LinkTwist,
+    RootPose,
+    ToolPose,
+)
 from ...effects.plausible import ranges
 from ...recording import JointMotion, Recording
 from ..algebra.fit import effect_precision, fit, robust_scale

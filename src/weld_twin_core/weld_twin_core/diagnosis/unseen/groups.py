@@ -22,9 +22,9 @@ import numpy as np
 from ...arm.dynamics import payload_torque, wrench_rotation
 from ...arrays import Array
 from ...effects.associative_scan import play
+from ...effects.compliance import PedestalTilt, base_leans, base_moments
 from ...effects.curves import QUANTITIES, FrameCurve, JointCurve, basis
 from ...effects.effect import Effect
-from ...effects.pedestal_tilt import PedestalTilt, base_leans, base_moments
 from ...twin.features import Features
 from ...twin.memory import Picker
 from ..algebra.definite import FLAT, ROUNDING

@@ -18,8 +18,7 @@ from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array
 from ...effects import Effect
 from ...effects.backlash import Backlash
-from ...effects.frame_errors import BasePose
-from ...effects.geometry import JointOffset
+from ...effects.geometry import BasePose, JointOffset
 from ...effects.servo_lag import ServoLag
 from ...motion.paths import Path
 from ...motion.planned_motion import plan

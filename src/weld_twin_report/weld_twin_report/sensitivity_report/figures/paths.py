@@ -8,8 +8,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects.backlash import Backlash
-from weld_twin_core.effects.frame_errors import BasePose
-from weld_twin_core.effects.geometry import JointOffset
+from weld_twin_core.effects.geometry import BasePose, JointOffset
 from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.motion.profiles import Constant

@@ -15,7 +15,7 @@ from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.arm.rotation import angle_between
 from weld_twin_core.errors import ReachError
 from weld_twin_core.motion.inverse import family, polish, solve, solve_path
-from weld_twin_core.motion.inverse.continuity import jumps
+from weld_twin_core.motion.inverse.along_path import jumps
 from weld_twin_core.motion.paths import Line, Torch
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia')

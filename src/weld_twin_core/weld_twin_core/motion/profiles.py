@@ -30,7 +30,7 @@ from scipy.interpolate import PPoly
 
 from ..arrays import Array
 from ..errors import PathError
-from .paths.seam_path import positive
+from .paths.seams import positive
 from .sample_count import MOST_SAMPLES, refuse_endless
 
 

@@ -21,10 +21,16 @@ How far is the tool off, at most, in 95 of 100 arms with the default tolerances?
 
 from .distribution import Distribution
 from .evaluate import Model, draws_at, model
+from .indices import (
+    MorrisDesign,
+    Screening,
+    SobolDesign,
+    SobolIndices,
+    morris_screening,
+    sobol_indices,
+)
 from .local import LocalSensitivity, local_sensitivity
-from .morris import MorrisDesign, Screening, morris_screening
 from .seam_study import Outcomes, Study, planned_study, recorded_study, study_of_plan
-from .sobol import SobolDesign, SobolIndices, sobol_indices
 from .stack import ToleranceStack, WeldTolerance, probabilities, tolerance_stack
 from .sweep import Sweep, default_values, sweep
 from .tolerance import Tolerance, default_tolerances, scaled, tolerances_from_list

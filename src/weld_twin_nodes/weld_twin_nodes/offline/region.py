@@ -11,8 +11,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.predicting.planned import JUDGED, clear_postures
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.inverse.multi_start import centred
-from weld_twin_core.motion.inverse.newton import polish
+from weld_twin_core.motion.inverse.newton import centred, polish
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.motion.programs import travel

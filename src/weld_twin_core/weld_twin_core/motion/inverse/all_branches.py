@@ -12,8 +12,7 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import ReachError
 from .closed_form import branches, family
-from .multi_start import CLOSED, centred, search
-from .newton import polish
+from .newton import CLOSED, centred, polish, search
 
 OTHER_POSTURE = (
     'the arm would have to change its posture on the way; '

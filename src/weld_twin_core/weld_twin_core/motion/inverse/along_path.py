@@ -14,15 +14,15 @@ from ...arm.bulk import kernel_of
 from ...arm.chain import Frames, chain_jacobian, forward, frames
 from ...arm.mounting import rising
 from ...arm.robot import Robot
-from ...arm.rotation import missing, moved
+from ...arm.rotation import missing, moved, wrapped
 from ...arrays import Array, spread_over
 from ...errors import ReachError
 from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
 from .closed_form import branches, family
-from .continuity import Mask, distances, joined, jumps, reach, travel
-from .following import follow
-from .multi_start import CLOSED, TURN, centring, null_space, search, turns_to_middle
-from .newton import polish
+from .following import LEAP, follow
+from .newton import CLOSED, TURN, centring, null_space, polish, search, turns_to_middle
+
+_Mask = NDArray[np.bool_]
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
@@ -199,7 +199,7 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
 
     spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
     tracks = spline(along)
-    lost: Mask = np.any(np.isnan(knots), axis=-1)
+    lost: _Mask = np.any(np.isnan(knots), axis=-1)
     for k, track in enumerate(tracks):
         tracks[k] = _on_turn(robot, polish(robot, track, poses)[0], seed)
         if lost[k].any():
@@ -223,7 +223,7 @@ def _track(robot: Robot, q: Array, poses: Array) -> Array:
 
 def _first_failures(robot: Robot, q: Array, poses: Array) -> NDArray[np.intp]:
     """Return of tracks (K, N, n) the first sample not reached, past a limit or after a jump, or N."""
-    fails: Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
+    fails: _Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
     fails[:, 1:] |= jumps(robot, q, poses)
     return np.where(fails.any(axis=1), fails.argmax(axis=1), len(poses))
 
@@ -246,7 +246,7 @@ def _best_first(robot: Robot, q: Array, seed: Array | None) -> NDArray[np.intp]:
     return np.lexsort((np.linalg.norm(q[:, 0], axis=-1), -better))
 
 
-def _above_base(robot: Robot, chain: Frames) -> Mask:
+def _above_base(robot: Robot, chain: Frames) -> _Mask:
     """Tell, shape (K,), whether joints stay on the arm's side of the surface the base stands on."""
     up, foot = rising(robot) * chain.base_rotation[:, 2], chain.base_point
     samples = chain.position.shape[:-1]
@@ -278,3 +278,63 @@ def _explain(robot: Robot, tracks: Array, failures: NDArray[np.intp], poses: Arr
     if outside[joint] > 0.0:
         return text + past_limit(robot, joint, q[joint])
     return text + OTHER_POSTURE
+
+
+_STEEP = 20.0
+"""Joint motion per motion of the tool (both in rad, lengths over reach) beyond which it flips."""
+
+_SUMS = np.array([[[0.0, 1.0]] * 3 + [[1.0, 0.0]]] * 3 + [[[0.0, 0.0]] * 4]).reshape(16, 2)
+"""Adds up the squares of a pose's position and of its rotation."""
+
+
+def reach(robot: Robot) -> float:
+    """Return the length of the stretched-out chain [m], an upper bound of the arm's reach."""
+    return float(np.hypot(robot.a, robot.d).sum() + np.linalg.norm(robot.T_flange_tool[:3, 3]))
+
+
+def travel(robot: Robot, poses: Array) -> Array:
+    """Return a strictly increasing measure of the way along the poses, shape (N,) [rad]."""
+    moved, turned = distances(poses[1:], poses[:-1])
+    return np.concatenate([[0.0], np.cumsum(moved / reach(robot) + turned + 1e-9)])
+
+
+def distances(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return how far poses (..., 4, 4) are apart, shape (...) each [m, rad]."""
+    gap = first - second
+    gap = gap.reshape(*gap.shape[:-2], 16)
+    gap *= gap
+    moved, turned = np.moveaxis(np.sqrt(gap @ _SUMS), -1, 0)
+    # The chord between rotations, as long as 2 sqrt(2) sin(angle / 2).
+    return moved, 2.0 * np.arcsin(np.minimum(turned / np.sqrt(8.0), 1.0))
+
+
+def joined(tracks: Array) -> Array:
+    """Return branches (K, N, n) that change places where an arm passes a singularity onto another."""
+    tracks = tracks.copy()
+    steps = np.abs(wrapped(np.diff(tracks, axis=1))).max(axis=-1)
+    for i in np.flatnonzero((steps > LEAP).any(axis=0)) + 1:
+        apart = np.abs(wrapped(tracks[:, i] - tracks[:, i - 1, None])).max(axis=-1)
+        apart = np.where(np.isnan(apart), np.inf, apart)
+        order = np.where(np.isinf(apart).all(axis=1), np.arange(len(tracks)), apart.argmin(axis=1))
+        if len(set(order)) == len(order):
+            tracks[:, i:] = tracks[order, i:]
+    return tracks
+
+
+def jumps(robot: Robot, q: Array, poses: Array) -> _Mask:
+    """
+    Tell, (..., N - 1), where joints (..., N, n) leave the path of poses (N, 4, 4) between samples.
+
+    Half way between two joint positions of one motion the tool is near both; half way between two
+    branches it is somewhere else, or the joints move much farther than the tool.
+    """
+    if len(poses) < 2:
+        return np.zeros((*q.shape[:-2], 0), dtype=bool)
+    halfway = forward(robot, np.nan_to_num(0.5 * (q[..., 1:, :] + q[..., :-1, :])))
+    tool = np.diff(travel(robot, poses))
+    size, away = reach(robot), -3.0 * tool
+    for ends in (poses[:-1], poses[1:]):
+        moved, turned = distances(halfway, ends)
+        away = away + np.hypot(moved / size, turned)
+    joints = np.abs(np.diff(q, axis=-2)).max(axis=-1)
+    return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))

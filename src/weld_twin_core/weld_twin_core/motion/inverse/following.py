@@ -25,8 +25,9 @@ from ...arm.bulk import BulkKernel, kernel_of
 from ...arm.robot import Robot
 from ...arm.rotation import skew
 from ...arrays import Array
-from .continuity import LEAP
 
+LEAP = 0.5
+"""Joint step [rad] between neighbours that calls for a second look."""
 _KNOTS = 16
 """Knots of the polynomials through which the rest of a smooth seam is guessed."""
 _SHORT = 2 * _KNOTS

@@ -12,14 +12,9 @@ Examples
 
 """
 
-from .arc import Arc, Circle
 from .bundled import KINDS, default_seam
-from .mapping import from_mapping
-from .polyline import Line, Polyline
-from .seam_path import Path, SeamFrames
-from .spline import Spline
+from .seams import Arc, Circle, Line, Path, Polyline, SeamFrames, Spline, Weave, from_mapping
 from .torch import Torch
-from .weave import Weave
 
 __all__ = ['KINDS', 'Arc', 'Circle', 'Line', 'Path', 'Polyline', 'SeamFrames', 'Spline', 'Torch']
 __all__ += ['Weave', 'default_seam', 'from_mapping']

@@ -15,13 +15,9 @@ from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array
 from ...errors import PathError, ReachError
 from ..inverse import CarriedArm, rest, solve_path
-from ..inverse.continuity import reach
-from .arc import Arc, Circle
-from .polyline import Line, Polyline
-from .seam_path import Path
-from .spline import Spline
+from ..inverse.along_path import reach
+from .seams import Arc, Circle, Line, Path, Polyline, Spline, Weave
 from .torch import Torch
-from .weave import Weave
 
 _COMFORT_LIMIT = 0.15
 """Distance to a joint limit [rad] from which a place is as good as any."""
@@ -52,41 +48,29 @@ class _Place(NamedTuple):
         return self.centre + local[:, :1] * self.along + local[:, 1:] * across
 
 
-def _line(place: _Place) -> Path:
-    start, end = place.points((-0.5, 0.0), (0.5, 0.0))
-    return Line(start, end, place.normal)
+def _line(at: _Place) -> Path:
+    start, end = at.points((-0.5, 0.0), (0.5, 0.0))
+    return Line(start, end, at.normal)
 
 
-def _arc(place: _Place) -> Path:
-    start, middle, end = place.points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15))
-    return Arc(start, middle, end, place.normal)
-
-
-def _circle(place: _Place) -> Path:
-    return Circle(place.centre, 0.2 * place.size, place.normal, place.along)
-
-
-def _polyline(place: _Place) -> Path:
-    points = place.points((-0.4, -0.2), (-0.4, 0.2), (0.0, 0.0), (0.4, 0.2), (0.4, -0.2))
-    return Polyline(points, 0.03 * place.size, place.normal)
-
-
-def _spline(place: _Place) -> Path:
-    points = place.points((-0.5, 0.0), (-0.25, 0.15), (0.0, 0.0), (0.25, -0.15), (0.5, 0.0))
-    return Spline(points, place.normal)
-
-
-def _weave(place: _Place) -> Path:
-    return Weave(_line(place), 0.01 * place.size, 0.05 * place.size)
+def _arc(at: _Place) -> Path:
+    start, middle, end = at.points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15))
+    return Arc(start, middle, end, at.normal)
 
 
 _SHAPES: dict[str, Callable[[_Place], Path]] = {
     'line': _line,
     'arc': _arc,
-    'circle': _circle,
-    'polyline': _polyline,
-    'spline': _spline,
-    'weave': _weave,
+    'circle': lambda at: Circle(at.centre, 0.2 * at.size, at.normal, at.along),
+    'polyline': lambda at: Polyline(
+        at.points((-0.4, -0.2), (-0.4, 0.2), (0.0, 0.0), (0.4, 0.2), (0.4, -0.2)),
+        0.03 * at.size,
+        at.normal,
+    ),
+    'spline': lambda at: Spline(
+        at.points((-0.5, 0.0), (-0.25, 0.15), (0.0, 0.0), (0.25, -0.15), (0.5, 0.0)), at.normal
+    ),
+    'weave': lambda at: Weave(_line(at), 0.01 * at.size, 0.05 * at.size),
 }
 KINDS = tuple(_SHAPES)
 

@@ -26,7 +26,7 @@ import numpy as np
 from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array, refuse_unknown
 from ...errors import PathError
-from .seam_path import SeamFrames
+from .seams import SeamFrames
 
 HEADINGS = ('fixed', 'seam')
 

@@ -25,9 +25,9 @@ from ...motion.planned_motion import plan
 from ...motion.profiles import Aggressive, Constant
 from ...twin.twin import Twin
 from ..evaluate import draws_at, exact_deviations, model
+from ..indices import SobolDesign
 from ..local import LocalSensitivity, local_sensitivity, posture
 from ..seam_study import Study, planned_study, study_of_plan
-from ..sobol import SobolDesign
 from ..sweep import (
     DEGREE,
     cumulative,

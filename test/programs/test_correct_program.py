@@ -195,6 +195,26 @@ end
 """
 
 
+@pytest.mark.parametrize(
+    ('header', 'frame'),
+    [
+        ({}, 'corrected by weld_twin'),
+        ({'header': {'stamp': {'sec': 0, 'nanosec': 0}}}, 'corrected by weld_twin'),
+        ({'header': {'frame_id': ''}}, 'corrected by weld_twin'),
+        ({'header': {'frame_id': 'base'}}, 'corrected by weld_twin; base'),
+    ],
+)
+def test_a_corrected_trajectory_in_json_says_so_in_its_header(header, frame, tmp_path):
+    points = [{'positions': [0.17, -1.39, 1.65 + k, -1.83, -1.57, 0.08]} for k in (0.0, 0.1)]
+    text = json.dumps(header | {'joint_names': wt.load('ur5').joint_names, 'points': points})
+    said = corrected(tmp_path, text, name='plan.json')
+    assert said.code == 0, said.err
+    written = (tmp_path / 'out' / 'plan.json').read_text()
+    assert json.loads(written)['header']['frame_id'] == frame
+    said = corrected(tmp_path, written, name='goal.json')
+    assert said.code == 2 and 'was corrected already' in said.err
+
+
 def test_what_is_expected_counts_the_way_and_what_an_encoder_rounds(tmp_path):
     # Outward from the base, with all points but one at the beginning. A base joint that stands off
     # moves the tool by its distance from the axis; an encoder in steps by up to half a step of that.

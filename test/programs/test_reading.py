@@ -485,6 +485,7 @@ def test_what_a_routine_of_another_file_sets_holds_after_its_call(language, text
 ABB_MOVE, ABB_ON, ABB_OFF = 'MoveL p1,v100,fine,tool0;', 'PDispSet x;', 'PDispOff;'
 TP_MOVE, TP_ON, TP_OFF = 'L P[1] 9mm/sec FINE', 'Touch Offset PR[1]', 'Touch Offset End'
 JOB_MOVE, JOB_ON, JOB_OFF = 'MOVL C00001 V=9.0', 'SFTON P001', 'SFTOF'
+KRL_MOVE = 'LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}'
 UR_MOVE, UR_HOME = 'movel(p[0.3,0.2,0.1,0,3.1,0])', 'movej([0,-1.4,1.6,-1.8,-1.5,0])'
 UR_ON, UR_OFF = 'track_conveyor_linear(p[1,0,0,0,0,0], 9)', 'stop_conveyor_tracking()'
 JOB_HEAD = (
@@ -536,6 +537,12 @@ TP_TAIL = (
         ('urscript', ['def b():', UR_MOVE, 'end', UR_ON, 'b()'], [False, True]),
         ('urscript', ['def b():', UR_MOVE, 'end', 'b()'], [True]),
         ('fanuc-ls', ['MP Offset PR[1] RPM[1]', TP_MOVE], [False]),
+        ('fanuc-ls', ['Track TAST[1]', TP_MOVE, 'Track End', TP_MOVE], [False, True]),
+        ('fanuc-ls', ['CALL TRACK_PART', TP_MOVE, f'{TP_MOVE} COORD'], [True, False]),
+        ('inform', ['COMARCON ASF#(1)', JOB_MOVE, 'COMARCOF', JOB_MOVE], [False, True]),
+        ('rapid', ['SoftAct 2,50;', ABB_MOVE, 'SoftDeact;', ABB_MOVE], [False, True]),
+        ('rapid', [ABB_MOVE.replace(';', '\\Corr;'), ABB_MOVE], [False, True]),
+        ('krl', ['RET=RSI_ON(#RELATIVE)', KRL_MOVE, 'RET=RSI_OFF()', KRL_MOVE], [False, True]),
     ],
 )
 def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines, known):
@@ -544,6 +551,7 @@ def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines
         'fanuc-ls': ('/PROG A\n/MN\n', '   1:{} ;\n', TP_TAIL),
         'inform': (JOB_HEAD, '{}\n', 'END\n'),
         'urscript': ('def a():\n', '{}\n', 'end\n'),
+        'krl': ('DEF a()\n', '{}\n', 'END\n'),
     }[language]
     text = head + ''.join(form.format(line) for line in lines) + tail
     steps = read(language, (text,), PROGRAMS[language][0]).steps
@@ -713,6 +721,65 @@ def test_a_wait_makes_the_move_before_it_last_longer(language, place, seconds):
     steps = read(language, texts, robot).steps
     assert [step.dwell for step in steps] == [seconds * (k == place) for k in range(len(steps))]
     assert steps[place].stop
+
+
+KRL_SAID = KRL_MOVE.replace('}', ',E1 0}')
+
+
+@pytest.mark.parametrize(
+    ('language', 'lines', 'held'),
+    [
+        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 500}', KRL_MOVE, KRL_SAID], [0, 1]),
+        ('krl', ['PTP {E1 500}', KRL_MOVE, KRL_SAID], [0]),
+        ('krl', ['XHOME.E1 = RAIL', KRL_MOVE, KRL_SAID], [0]),
+        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 0.0}', KRL_MOVE, KRL_SAID], []),
+        ('rapid', ['MoveExtJ rail,v100,fine;', ABB_MOVE], [0, 1]),
+        ('rapid', [ABB_MOVE], []),
+        ('inform', ['BC00000=500000\n//INST', 'MOVJ BC00000 VJ=9.0', JOB_MOVE], [0]),
+        ('inform', ['BC00000=0\n//INST', JOB_MOVE], []),
+    ],
+)
+def test_points_that_do_not_say_where_a_rail_stands_that_moves_are_left(language, lines, held):
+    head, tail = {
+        'rapid': (RAPID_SEAM.partition('sub;')[0], 'ENDPROC\nENDMODULE\n'),
+        'inform': (JOB_HEAD.partition('//INST')[0], 'END\n'),
+        'krl': ('DEF a()\n', 'END\n'),
+    }[language]
+    text = head + ''.join(f'{line}\n' for line in lines) + tail
+    assert sorted(read(language, (text,), PROGRAMS[language][0]).fixed) == held
+
+
+@pytest.mark.parametrize(
+    ('other', 'held'),
+    [
+        ('p1.trans.z := 5;', True),
+        ('MoveL P1,v9,fine,tool0;', True),
+        ('VAR robtarget p1;\nMoveL p1,v9,fine,tool0;', False),
+        ('MoveL p11,v9,fine,tool0; ! not p1', False),
+    ],
+)
+@pytest.mark.parametrize('local', ['', 'LOCAL '])
+def test_a_point_that_another_program_of_the_folder_uses_is_left(other, held, local):
+    beside = (Source('other.mod', RAPID_OTHER.format('x', other)),)
+    own = context('abb_irb1600', 'rapid')._replace(beside=beside)
+    text = RAPID_CALLS.replace('CONST robtarget', f'{local}CONST robtarget')
+    program = read_sources([Source('file', text)], own, 'rapid')
+    assert bool(program.fixed) == (held and not local)
+    where = {'XA': 'GLOBAL ', 'XB': ''}
+    points = [f'DECL {word}POS {name}={KRL_MOVE[4:]}\n' for name, word in where.items()]
+    sources = [Source('a.src', 'DEF a()\nLIN XA\nLIN XB\nEND\n'), Source('a.dat', ''.join(points))]
+    own = context('kuka_kr16_2', 'krl')
+    own = own._replace(beside=(Source('b.src', 'DEF b()\nLIN XA\nLIN XB\nEND\n'),))
+    assert list(read_sources(sources, own, 'krl').fixed) == [0]
+
+
+def test_numbers_of_a_table_that_are_not_read_are_told():
+    (name,) = PROGRAMS['csv'][1]
+    lines = (MADE / name).read_text().splitlines()
+    assert not read('csv', ('\n'.join(lines),), 'ur5').notes
+    head, *rows = lines[1:]
+    text = '\n'.join([f'rail,{head}', *(f'{k},{row}' for k, row in enumerate(rows))])
+    assert 'the numbers of rail are not read' in read('csv', (text,), 'ur5').notes[0]
 
 
 def test_a_wait_is_of_its_own_routine_and_one_before_any_move_of_none():

@@ -171,6 +171,8 @@ def test_two_diagnoses_for_one_program_are_refused_in_a_sentence(app, tmp_path):
     one = Visitor(app, authorization='Bearer right')
     files, model = (('seam.src', b'DEF a()\nEND\n'),), (('a.json', b'{}'), ('b.json', b'{}'))
     assert 'Two diagnoses were dropped' in one.ask('/program', *form(files=files, model=model))
+    said = one.ask('/program', *form(files=files, model=model[:1], of='0' * 32))
+    assert 'A diagnosis was chosen and another one dropped' in said
     assert not list((tmp_path / 'jobs').iterdir())
 
 

@@ -295,6 +295,8 @@ def test_what_is_refused_says_why_and_does_not_reach_the_controller(planner):
     tight.path_tolerance = [JointTolerance(name=NAMES[2], position=OFF / 2)]
     for point in same_time.trajectory.points:
         point.time_from_start.sec = point.time_from_start.nanosec = 0
+    twice = planner.goal(motion)
+    twice.trajectory.header.frame_id = 'corrected by weld_twin; base'
     past = planner.cell.node.get_clock().now().nanoseconds - 5_000_000_000
     fewer = JointMotion(motion.t, motion.q[:, :5])
     for asked, reason in (
@@ -302,6 +304,7 @@ def test_what_is_refused_says_why_and_does_not_reach_the_controller(planner):
         (planner.goal(motion, stamp=past), 'should have begun'),
         (planner.goal(fewer, names=NAMES[:5]), "no joint 'wrist_3"),
         (same_time, 'must increase'),
+        (twice, 'was corrected already'),
         (planner.goal(sway(begin=HOME + 0.5)), 'outside what was recorded'),
         (planner.goal(sway(span=0.05)), 'the goal itself breaks'),
     ):

@@ -110,7 +110,8 @@ def unclear(what: str) -> Unclear:
 def unclear_shift(where: str) -> Frame:
     """Return the shift of a place that is displaced on some of its ways."""
     return Frame(
-        '', why=f'whether it is displaced hangs on which way the program takes at {where}'
+        '',
+        why=f'whether it goes where its point says hangs on which way the program takes at {where}',
     )
 
 

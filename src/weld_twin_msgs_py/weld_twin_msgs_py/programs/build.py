@@ -85,6 +85,9 @@ class Program:
     notes: list[str] = field(default_factory=list)
     """What a reader should know, in sentences."""
     one_seam: bool = False  # the whole program is corrected together or not at all
+    beside: str = ''  # where external axes move that the robot file does not have
+    silent: list[int] = field(default_factory=list)
+    """Points that do not say where such axes stand."""
 
     def add_point(
         self,
@@ -125,6 +128,23 @@ class Program:
     def hold(self, point: int, why: str) -> None:
         """Keep a point from being moved."""
         self.fixed.setdefault(point, why)
+
+    def stands_beside(self, point: int, axes: Sequence[float]) -> None:
+        """Take in where a point has external axes that the robot file does not have."""
+        if any(axes):
+            self.hold(point, f'{self.points[point].name} moves external axes')
+            self.beside = self.beside or self.points[point].where
+        elif not axes:
+            self.silent.append(point)
+
+    def hold_silent(self) -> None:
+        """Keep points that do not say where external axes stand, if such axes move."""
+        for point in self.silent if self.beside else ():
+            self.hold(
+                point,
+                f'the program moves external axes at {self.beside}, and {self.points[point].name} does '
+                'not say where they stand; write it there, or give a robot file that has them',
+            )
 
     @property
     def steps(self) -> list[Step]:

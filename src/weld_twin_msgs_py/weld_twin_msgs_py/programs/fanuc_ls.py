@@ -41,7 +41,11 @@ _SHIFTING = re.compile(
     r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_|\bRTCP\b|\bTA_REF\b', re.I
 )
 """What lets a move go elsewhere; RTCP is a tool that stands still."""
-_DISPLACING = re.compile(r'(?:Touch|MP) Offset (End\b)?', re.I)
+_DISPLACING = re.compile(
+    r'(?:\A|:[ \t]*)(?:(?:Touch|MP) Offset|Track|SOFTFLOAT)\b ?(End\b)?', re.I
+)
+"""What shifts moves, lets them follow a sensor or give way, and what ends that."""
+_COORD = re.compile(r'\bCOORD\b')
 _TRACKING = re.compile(r'^[ \t]*LINE_TRACK_SCHEDULE_NUMBER[ \t]*:[ \t]*[1-9]', re.M)
 """Head of a program whose points move with a conveyor; the schedule 0 is none."""
 _BLOCK = re.compile(r'(?:(IF(?=\b.*\bTHEN\Z)|FOR)\b|(ELSE)\Z|(END(?:IF|FOR))\Z|(LBL)\[)', re.S)
@@ -112,8 +116,7 @@ class FanucReader(Reader):
         self.frames[point] = self._frames(first, last, where)
         known = [axis.label for axis in self.context.controller.external]
         outer = [key for key in fields if key[0] in 'EG' and key not in known]
-        if starred or any(fields[key].value != 0.0 for key in outer):
-            self.program.hold(point, f'P[{index}] moves other axes')
+        self.program.stands_beside(point, [1.0] * starred + [fields[key].value for key in outer])
 
     def _with_groups(
         self, fields: dict[str, Number], start: int, end: int, index: int
@@ -158,6 +161,11 @@ class FanucReader(Reader):
         base = Frame('', np.eye(4)) if user == '0' else self.numbered('UFRAME', user)
         return self.numbered('UTOOL', tool), base
 
+    def numbered(self, table: str, index: str) -> Frame:
+        """Return a frame of a table; F is the one that holds when the move runs."""
+        why = f'{table} F is whichever {table}_NUM says when the move runs'
+        return Frame(index, why=why) if index == 'F' else super().numbered(table, index)
+
     # Moves -----------------------------------------------------------------------------------
 
     def _statement(self, result: re.Match[str]) -> None:
@@ -167,7 +175,9 @@ class FanucReader(Reader):
             self.program.dwell(max(float(wait[1]), 0.0))
         offset = _DISPLACING.match(text)
         if offset is not None:
-            self.shift = Frame('', why='' if offset[1] else f'{offset[0]}at {where} shifts it')
+            self.shift = Frame(
+                '', why='' if offset[1] else f'{offset[0].strip()} at {where} shifts it'
+            )
         block = _BLOCK.match(text)
         if block is not None and block[4] and _DISPLACING.search(self.text):
             self.shift = unclear_shift(where)
@@ -192,6 +202,8 @@ class FanucReader(Reader):
             return
         why = f'{found[0]} shifts it' if found else ''
         why = why or (f'{move[1]} is not understood' if move[1] not in _KINDS else '')
+        if _COORD.search(tail) and not self.context.controller.external:
+            why = 'COORD lets it go along with a group that the robot file does not have'
         self._add(kind, where, via, point, tail, Frame('', why=why) if why else self.shift)
 
     def _hold_used(self, text: str, where: str, moves: bool) -> None:
@@ -217,7 +229,7 @@ class FanucReader(Reader):
             base,
             _speed(kind, tail),
             re.search(r'\bFINE\b', tail) is not None,
-            along=re.search(r'\bCOORD\b', tail) is not None,
+            along=_COORD.search(tail) is not None,
             astray=flags_kept(kind, self.program.points[point], (*TURNS, WRIST)),
             shift=shift,
         )

@@ -35,7 +35,8 @@ _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
 _MOVE = re.compile(r'^[ \t]*(\+?[A-Z]*MOV[A-Z]*)\b[ \t]*([^\r\n]*)', re.M)
 """Also moves that go along with another robot, a positioner or a conveyor: SMOVL, EMOVL, SYMOVL."""
-_SHIFT = re.compile(r'^[ \t]*(SFTON|SFTOF|MULMAT|GETPOS|SETUALM)\b', re.M)
+_SHIFT = re.compile(r'^[ \t]*(?:(SFTON|COMARCON)|(SFTOF|COMARCOF)|MULMAT|GETPOS|SETUALM)\b', re.M)
+"""What shifts moves or lets them follow a sensor, and what ends that; others part an arc."""
 _BLOCK = re.compile(
     r'^[ \t]*(?:(IF(?=THEN)|WHILE|FOR|SWITCH)|(ELSE(?:IF)?|CASE|DEFAULT)|(END(?:IF|WHILE|SWITCH)|NEXT)'
     r')(?:THEN)?(?:EXP)?\b',
@@ -80,7 +81,8 @@ class InformReader(Reader):
             _BLOCK: self._block,
         }
         calls = self.calls(self.routines_named(), _displaces)
-        labels = {_LABEL: self._label} if calls or 'SFTON' in self.text else {}
+        shifts = calls or any(match[1] for match in _SHIFT.finditer(self.text))
+        labels = {_LABEL: self._label} if shifts else {}
         self.in_order(found | labels, cut, more=[(self.displacing, calls)])
         self._close_arc()
         return self.program
@@ -97,6 +99,8 @@ class InformReader(Reader):
         self.base = named if self.form == 'USER' else Frame('', np.eye(4))
 
     def _point(self, result: re.Match[str]) -> None:
+        if result[1] == 'BC' and re.search('[1-9]', result[3]):
+            self.program.beside = self.program.beside or self.where(result)
         if result[1] != 'C':
             return  # Variables and other axes: a move that uses them is not understood.
         name = f'C{int(result[2]):05d}'
@@ -114,8 +118,7 @@ class InformReader(Reader):
 
     def _added(self, name: str, numbers: list[Number], count: int, notation: Notation) -> int:
         point = self.program.add_point(name, numbers[:count], notation)
-        if any(number.value != 0.0 for number in numbers[count:]):
-            self.program.hold(point, f'{name} has a seventh axis')
+        self.program.stands_beside(point, [number.value for number in numbers[count:]])
         return point
 
     def _notation(self, where: str) -> Notation:
@@ -138,10 +141,9 @@ class InformReader(Reader):
 
     def _shift(self, result: re.Match[str]) -> None:
         self._close_arc()
-        where = self.where(result)
-        if result[1] == 'SFTON':
-            self.shift = Frame('', why=f'SFTON at {where} shifts it')
-        elif result[1] == 'SFTOF':
+        if result[1]:
+            self.shift = Frame('', why=f'{result[1]} at {self.where(result)} shifts it')
+        elif result[2]:
             self.shift = Frame('')
 
     def _label(self, result: re.Match[str]) -> None:
@@ -209,7 +211,8 @@ class InformReader(Reader):
 
 def _displaces(text: str) -> bool:
     """Return whether points are displaced after a job, by its text."""
-    return text.rfind('SFTON') > text.rfind('SFTOF')
+    last = [bool(match[1]) for match in _SHIFT.finditer(text) if match[1] or match[2]][-1:]
+    return any(last)
 
 
 def _speed(kind: Kind, rest: str) -> float:

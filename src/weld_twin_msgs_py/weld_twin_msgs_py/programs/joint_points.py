@@ -123,7 +123,7 @@ class CsvReader(Reader):
     comments = ()
 
     def read(self) -> Program:
-        head: list[str] = []
+        head, columns, cells = list[str](), list[str](), dict[str, Span]()
         for line in re.finditer(r'[^\r\n]+', self.text):
             place = line.start()
             if not line[0].strip() or line[0].lstrip().startswith('#'):
@@ -139,6 +139,12 @@ class CsvReader(Reader):
             numbers = [self.number(*cells[name], name) for name in columns]
             point = self.program.add_point(f'line {self.source.line(place)}', numbers, notation)
             self.program.add(self._step(cells, point, notation.joints, where))
+        others = [name for name in head if name not in (*columns, 'move', 'speed', 'dwell')]
+        if named := [name for name in others if np.isfinite(self.value(cells.get(name), np.nan))]:
+            self.program.notes.append(
+                f'the numbers of {", ".join(named)} are not read: they stay, and the arm is taken to '
+                'stand still in them'
+            )
         return self.program
 
     def _columns(self, where: str, head: Sequence[str]) -> tuple[list[str], Notation]:

@@ -26,7 +26,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .blocks import Blocks, Frames, unclear
+from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
 from .context import Context
 from .controllers import Frame
@@ -38,6 +38,10 @@ POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', '
 SPEED = 0.1
 """m/s while the program has not said."""
 _MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
+_EXTERNAL = re.compile(
+    r'\b(E[1-6])(?:[ \t]*=[ \t]*|[ \t]+)(?=\S)(?![-+]?0*\.?0*(?:[,}\s]|\Z))', re.I
+)
+"""An external axis that stands elsewhere than at zero, in a point or set by itself."""
 _SPLINE = re.compile(r'^[ \t]*(?:(?:PTP_)?SPLINE|ENDSPLINE)\b([^\r\n]*)', re.I | re.M)
 """Where a block of moves begins, with settings that all of them have, and where it ends."""
 _OTHER = re.compile(r'^[ \t]*(SPL|SPTP_REL|ASYPTP)\b', re.I | re.M)
@@ -46,6 +50,7 @@ _DECLARED = re.compile(
     r'(E6POS|POS|FRAME|E6AXIS|AXIS|FDAT|LDAT|PDAT)[ \t]+([A-Za-z_]\w*)[ \t]*=[ \t]*(\{)',
     re.I | re.M,
 )
+_DECLARES = re.compile(r'\b(?:E6POS|POS|FRAME|E6AXIS|AXIS)[ \t]+([A-Za-z_]\w*)', re.I)
 _SET = re.compile(
     r'^[ \t]*(\$(?:BASE|TOOL)(?:\.\w+)?|\$IPO_MODE|\$VEL\.CP|\$VEL_AXIS\[\w+\]|FDAT_ACT|LDAT_ACT|'
     r'PDAT_ACT|(?:BASE|TOOL)_DATA\[\d+\])[ \t]*=[ \t]*([^\r\n]*)',
@@ -96,6 +101,8 @@ _ALONG = re.compile(
     re.I,
 )
 """A base that goes along with a positioner; the frame on its flange follows, and a bracket."""
+_SENSED = re.compile(r'\b((?:RSI|ST)_(?:ON|(OFF))\w*)[ \t]*\(', re.I)
+"""What lets moves follow a sensor, and what ends that."""
 _BLOCK = re.compile(
     r'^[ \t]*(?:(IF|SWITCH|LOOP|WHILE|FOR|REPEAT)|(ELSE|CASE|DEFAULT)|'
     r'(END(?:IF|SWITCH|LOOP|WHILE|FOR)|UNTIL)|EXIT)\b',
@@ -142,9 +149,11 @@ class KrlReader(Reader):
         self.tools: list[Frame] = []
         self.bases: list[Frame] = []
         self.blocks = Blocks(
-            self.program, tool=unclear('$TOOL'), base=unclear('$BASE'), shift=lambda _: STILL
+            self.program, tool=unclear('$TOOL'), base=unclear('$BASE'), shift=unclear_shift
         )
         self.spline = ''
+        self.shared: list[str] = []
+        """Points that other programs see, too."""
 
     def read(self) -> Program:
         self.again = self.set_again(_ASSIGNED)
@@ -165,6 +174,7 @@ class KrlReader(Reader):
                 _SET: self._set,
                 _BAS: self._bas,
                 _WAIT: lambda match: self.dwell(match.span(1)),
+                _SENSED: self._sensed,
                 _ROUTINE: self._routine,
                 _BLOCK: self._block,
                 _SPLINE: lambda match: setattr(self, 'spline', match[1].upper()),
@@ -180,7 +190,9 @@ class KrlReader(Reader):
         self.settle('tool', OTHER_TOOL, self.tools)
         self.settle('base', OTHER_BASE, self.bases)
         self.shift_all(_ROOT_SET, 'what bases count from is set at {}')
+        self.moves_beside(_EXTERNAL)
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
+        self.hold_shared({name: self.names[name] for name in self.shared}, _DECLARES)
         return self.program
 
     # Declarations ----------------------------------------------------------------------------
@@ -201,6 +213,7 @@ class KrlReader(Reader):
                 self.data[name] = content
             else:
                 self.names[name] = point
+                self.shared += [name] if 'GLOBAL' in result[0].upper() else []
 
     def _frame_tables(self) -> None:
         """Take in TOOL_DATA and BASE_DATA where they stand in one of the files."""
@@ -250,8 +263,7 @@ class KrlReader(Reader):
                     name, numbers, notation, file, self.context.external(numbered)
                 )
                 outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
-                if any(content.numbers[key].value != 0.0 for key in outer):
-                    self.program.hold(point, f'{name} moves external axes')
+                self.program.stands_beside(point, [content.numbers[k].value for k in outer])
                 turn = content.numbers.get('T')
                 if turn is not None and notation is KUKA_POSE:
                     self.turns[point] = int(turn.value)
@@ -271,6 +283,10 @@ class KrlReader(Reader):
         now = (state.tool, state.base, state.shift)
         after = self.blocks.follow(self.where(result), result.groups(), now)
         state.tool, state.base, state.shift = after
+
+    def _sensed(self, result: re.Match[str]) -> None:
+        why = f'{result[1]} at {self.where(result)} lets a sensor displace it'
+        self.state.shift = MOVING if result[2] else Frame('', why=why)
 
     def _use(self, tool: Frame | None, base: Frame | None) -> None:
         """Set tool and base for the moves that follow; None leaves one as it is."""

@@ -173,10 +173,10 @@ _COUNT = re.compile(r'^(LINE_COUNT[ \t]*=[ \t]*)\d+', re.M)
 
 
 def marked(source: Source, name: str) -> Source:
-    """Return a file that a correction changed, with the remark; JSON knows none, and stays."""
+    """Return a file that a correction changed, with the remark; that of JSON is its frame_id."""
     text, language = source.text, LANGUAGES[name]
     if text.lstrip().startswith('{'):
-        return source
+        return Source(source.name, _named_frame(text))
     said = masked(text, language.reader.comments).rstrip(_END)
     found = re.search(language.before, said, re.I | re.M)
     place = found.start() if found and found[0] else len(text.rstrip('\x1a'))
@@ -189,6 +189,20 @@ def marked(source: Source, name: str) -> Source:
     return Source(
         source.name, head + gap + language.remark.format(MARK, number=number) + end + rest
     )
+
+
+def _named_frame(text: str) -> str:
+    """Return a trajectory in JSON with the remark in the header, where no controller reads it."""
+    for pattern, added in (
+        (r'"frame_id"\s*:\s*"(?=")', MARK),
+        (r'"frame_id"\s*:\s*"', f'{MARK}; '),
+        (r'"header"\s*:\s*\{(?=\s*")', f'"frame_id": "{MARK}", '),
+        (r'(?="joint_names"\s*:\s*\[\s*")', f'"header": {{"frame_id": "{MARK}"}}, '),
+    ):
+        found = re.search(pattern, text)
+        if found is not None:
+            return text[: found.end()] + added + text[found.end() :]
+    return text
 
 
 def refuse_marked(sources: Sequence[Source]) -> None:
@@ -211,4 +225,5 @@ def read_sources(sources: Sequence[Source], context: Context, name: str) -> Prog
     """Return the program of texts in a language of the table."""
     program = LANGUAGES[name].reader(sources, context).read()
     program.language = name
+    program.hold_silent()
     return program

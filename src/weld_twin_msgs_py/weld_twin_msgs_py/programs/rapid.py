@@ -50,10 +50,11 @@ NO_AXIS = 8.9e9
 SPEED = 0.1
 """m/s where the speed is not known."""
 _DECLARED = re.compile(
-    r'\b(?:CONST|PERS|VAR)\s+(robtarget|jointtarget|tooldata|wobjdata|speeddata)\s+'
+    r'\b(LOCAL\s+)?(?:CONST|PERS|VAR)\s+(robtarget|jointtarget|tooldata|wobjdata|speeddata)\s+'
     r'([A-Za-z]\w*)\s*(\{[^}]*\})?\s*:=\s*',
     re.I,
 )
+_DECLARES = re.compile(r'\b(?:robtarget|jointtarget)\s+([A-Za-z]\w*)', re.I)
 _MOVE = re.compile(
     r'\b(?:Move(AbsJ|J|L|C)(?:DO|AO|GO|Sync)?|Arc(L|C)(?:\d?(?:Start|End))?|Trigg(J|L|C)(?:IOs)?)'
     r'(?=[\s\\])(?!\s*:=)',
@@ -62,11 +63,13 @@ _MOVE = re.compile(
 _ACTS = re.compile(r'(?:DO|AO|GO|Sync)\Z', re.I)
 """Ends the name of a move that says behind its tool what happens at its point."""
 _OTHER = re.compile(
-    r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|EGMRun\w+|Ind[ARCD]Move|StepBwdPath|'
+    r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|SoftAct|SoftDeact|EGMRun\w+|Ind[ARCD]Move|StepBwdPath|'
     r'PathRecMove\w+|MoveExtJ)\b',
     re.I,
 )
 """What shifts the points after it, or moves the arm and names neither tool nor point."""
+_EXTERNAL = re.compile(r'\b(MoveExtJ|extax|eax_[a-f])\b', re.I)
+"""What moves external axes without a move of the arm."""
 _CALL = re.compile(
     r'(?:^|(?<=;))[ \t]*(?!RETURN\b|CONNECT\b)([A-Za-z]\w*)(?=[ \t\\])(?!\s*:=)'
     r'((?:[^;\r\n]|,[ \t]*\r?\n|\r?\n(?=[ \t]*\\)){0,1000});',
@@ -79,7 +82,10 @@ _ASSIGNED = re.compile(r'(?<![\w.\\])([A-Za-z]\w*)((?:\s*\{[^}]*\}|\.(?!tload\b)
 """What may be a tool or a work object, and what part of it; what hangs at a tool moves no frame."""
 _READS = ('setsysdata', 'waitwobj', 'dropwobj', 'fcact')
 """Instructions that are handed a tool or a work object alone, and do not set it."""
-_DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset')
+_DISPLACED = ('pdispon', 'pdispset', 'eoffson', 'eoffsset', 'softact')
+_ENDED = ('pdispoff', 'eoffsoff', 'softdeact')
+_SENSED = re.compile(r'\\(Corr|Track)\b', re.I)
+"""A switch of a move that follows what a sensor says."""
 _WAIT = re.compile(r'\bWaitTime\b((?:\s*\\\w+\s*,?)*)\s*([^;]*);', re.I)
 _ROUTINE = re.compile(
     r'^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC[ \t]+\w+|TRAP)[ \t]+(\w+)', re.I | re.M
@@ -124,6 +130,8 @@ class RapidReader(Reader):
         self.speeds: dict[str, float] = {}
         self.used: set[int] = set()
         self.suits: dict[int, Suits] = {}
+        self.local: set[str] = set()
+        """Points that other modules do not see."""
         self.config = {'j': True, 'l': True}
         self.entered: dict[str, tuple[Frame, list[Frame]]] = {}
         """By routine the shift with which it begins, and those where it is called."""
@@ -155,7 +163,10 @@ class RapidReader(Reader):
             ],
         )
         self._settle_shifts()
+        if not self.context.controller.external:
+            self.moves_beside(_EXTERNAL)
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
+        self.hold_shared({n: k for n, k in self.names.items() if n not in self.local}, _DECLARES)
         return self.program
 
     def _set_by_calls(self, routines: dict[str, str]) -> None:
@@ -174,29 +185,30 @@ class RapidReader(Reader):
     # Declarations ----------------------------------------------------------------------------
 
     def _declaration(self, result: re.Match[str]) -> None:
-        kind, name = result[1].lower(), result[2].lower()
-        where = self.where(result, 2)
-        self.used.add(result.start(2))
-        if result[3] or not self.text.startswith('[', result.end()):
+        kind, name = result[2].lower(), result[3].lower()
+        where = self.where(result, 3)
+        self.used.add(result.start(3))
+        if result[4] or not self.text.startswith('[', result.end()):
             return  # An array, or a value that is worked out: moves to it are not understood.
         known: list[dict[str, Any]] = [self.names, self.tools, self.bases, self.speeds]
         if any(name in table for table in known):
-            raise DataError(f'{where}: {result[2]} is declared twice')
+            raise DataError(f'{where}: {result[3]} is declared twice')
         tree = self._tree(result.end(), closing(self.source, self.text, result.end()) + 1)
         if kind in ('robtarget', 'jointtarget'):
-            point = self._target(tree, result.end(), result[2], kind == 'jointtarget')
+            point = self._target(tree, result.end(), result[3], kind == 'jointtarget')
             if point is not None:
                 self.names[name] = point
+                self.local |= {name} if result[1] else set()
         elif kind in ('tooldata', 'wobjdata'):
             frames, read = (
                 (self.tools, self._tool) if kind == 'tooldata' else (self.bases, self._wobj)
             )
-            frames[name] = read(tree, result[2], result.end())
+            frames[name] = read(tree, result[3], result.end())
             if name in self.again:
-                why = f'the numbers of {result[2]} are set anew at {self.again[name]}'
-                frames[name] = Frame(result[2], why=why)
+                why = f'the numbers of {result[3]} are set anew at {self.again[name]}'
+                frames[name] = Frame(result[3], why=why)
         elif isinstance(tree, list) and tree and isinstance(tree[0], Leaf):
-            speed = self.number(*tree[0], f'the speed of {result[2]}').value
+            speed = self.number(*tree[0], f'the speed of {result[3]}').value
             self.speeds[name] = max(speed, 0.1) * 1e-3
 
     def _tool(self, tree: Tree, name: str, at: int) -> Frame:
@@ -256,9 +268,8 @@ class RapidReader(Reader):
             if len(parts) > 2:
                 conf = self._numbers(parts[2:3], (4,), name, start)
                 self.suits[point] = quadrants([round(number.value) for number in conf])
-        others = [number for k, number in enumerate(outer) if k not in places]
-        if any(0.0 != abs(number.value) < NO_AXIS for number in others):
-            self.program.hold(point, f'{name} moves external axes')
+        others = [number.value for k, number in enumerate(outer) if k not in places]
+        self.program.stands_beside(point, [value for value in others if abs(value) < NO_AXIS])
         return point
 
     def _numbers(
@@ -292,7 +303,7 @@ class RapidReader(Reader):
 
     def _other(self, result: re.Match[str]) -> None:
         where = self.where(result)
-        if result[1].lower().endswith('offsoff') or result[1].lower() == 'pdispoff':
+        if result[1].lower() in _ENDED:
             line = self.text[self.text.rfind('\n', 0, result.start()) + 1 : result.start()]
             self.shift = self.shift if _COMPACT.search(line) else Frame('')
         elif result[1].lower() in _DISPLACED:
@@ -361,7 +372,9 @@ class RapidReader(Reader):
         point = self.program.points[places[-1].point]
         # It counts quadrants, of which the nearest is taken; the side of the wrist is one of two.
         astray = flags_kept(kind, point, (WRIST,)) if asked else None
-        self.program.add(replace(step, astray=astray, shift=self.shift))
+        sensed = _SENSED.search(self.text, result.end(), end)
+        shift = Frame('', why=f'{sensed[1]} displaces it') if sensed else self.shift
+        self.program.add(replace(step, astray=astray, shift=shift))
 
     def _arguments(self, start: int, end: int) -> list[tuple[int, int]]:
         """Return the arguments of a move, the switches before the first left out."""
@@ -466,5 +479,5 @@ class RapidReader(Reader):
 def _displaces(text: str) -> bool:
     """Return whether points are displaced after a routine, by its text."""
     words = [result[1].lower() for result in _OTHER.finditer(text)]
-    last = next((word for word in reversed(words) if word[:5] in ('pdisp', 'eoffs')), '')
+    last = next((word for word in reversed(words) if word in (*_DISPLACED, *_ENDED)), '')
     return last in _DISPLACED

@@ -4,7 +4,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -223,6 +223,28 @@ class Reader(ABC):
             shift = Frame('', why=why.format(self.where(match)))
             for piece in self.program.pieces:
                 piece[:] = [replace(step, shift=shift) for step in piece]
+
+    def hold_shared(self, names: Mapping[str, int], own: re.Pattern[str]) -> None:
+        """
+        Keep points that other programs of the folder use, for nobody corrects them there.
+
+        own: what declares a name of its own (first group) in such a program.
+        """
+        for source in self.context.beside:
+            text = masked(source.text, self.comments)
+            declared = {match[1].lower() for match in own.finditer(text)}
+            for match in re.finditer(r'[A-Za-z_]\w*', text):
+                if (name := match[0].lower()) in names and name not in declared:
+                    why = f'{match[0]} is used at {source.where(match.start())} as well'
+                    self.program.hold(names[name], f'{why}, which is not corrected with it')
+
+    def moves_beside(self, pattern: re.Pattern[str]) -> None:
+        """Take in where external axes move, but those (first group) that the robot file has."""
+        known = {axis.label for axis in self.context.controller.external}
+        for source, text in zip(self.sources, self.texts, strict=True):
+            for match in pattern.finditer(text):
+                if match[1].upper() not in known:
+                    self.program.beside = self.program.beside or source.where(match.start())
 
     def take_positioner(self, name: str, goes_along: str) -> None:
         """Refuse a second external kinematic system: a robot file has one positioner."""

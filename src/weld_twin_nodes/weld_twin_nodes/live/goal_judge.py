@@ -21,6 +21,7 @@ from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.goals import GoalPoints, beyond_tolerance, read_goal
 from weld_twin_msgs_py.messages.topics import AUDIT
+from weld_twin_msgs_py.programs.languages import MARK
 
 from .cell_node import CellNode
 from .work_beside import WorkBeside
@@ -151,7 +152,9 @@ class GoalJudge:
         timer = self._node.every(POLL, look)
 
     def _read(self, goal: Any, names: tuple[str, ...]) -> GoalPoints:
-        """Return the points of a goal; refuse one that should have begun already."""
+        """Return the points of a goal; refuse one that was corrected or should have begun already."""
+        if MARK in goal.trajectory.header.frame_id:
+            raise DataError('the goal was corrected already, as the frame_id of its header says')
         given = read_goal(goal.trajectory, names)
         at = time_ns(goal.trajectory.header.stamp)
         late = (self._node.get_clock().now().nanoseconds - at) * 1e-9 - float(given.goal.t[0])

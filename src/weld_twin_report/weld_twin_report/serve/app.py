@@ -145,6 +145,8 @@ class _Site:
         key = str(form.get('of', ''))
         if not key:
             return ''
+        if (beside / DIAGNOSIS).is_file():
+            raise DataError('a diagnosis was chosen and another one dropped; keep one of them')
         job = self._job(request, key)
         result = self._queue.folder(job) / FOUND / DIAGNOSIS
         if job.state != DONE or not result.is_file():

@@ -41,7 +41,7 @@ def run(given: Given) -> int:
 
 
 def _refuse_corrected(program: Path) -> None:
-    """Refuse a program that lies where a correction moved its points: JSON has no remark of that."""
+    """Refuse a program that lies where a correction without remarks moved its points."""
     try:
         content = read_json(program.resolve().parent / RESULT)
     except DataError:

@@ -5,7 +5,6 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from weld_twin_core.diagnosis.evidence import LIKELIER
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 from weld_twin_core.diagnosis.verdict.decision import NO_GAP, UNEVEN
 
@@ -20,6 +19,7 @@ from .words import (
     cause_words,
     effect_name,
     in_words,
+    kinds_doubted,
     likely,
     listed,
     not_to_be_tried,
@@ -109,8 +109,8 @@ def _families(diagnosis: Diagnosis) -> str:
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
-    kinds = [one for one in diagnosis.causes if one.name and not one.rest]
-    if diagnosis.families and all(one.probability <= LIKELIER for one in kinds):
+    if kinds_doubted(diagnosis):
+        kinds = [one for one in diagnosis.causes if one.name and not one.rest]
         first = (
             f'The {size} is explained best by many small errors together; these data do not tell'
         )

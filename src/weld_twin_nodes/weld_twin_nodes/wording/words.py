@@ -225,6 +225,12 @@ def same_words(diagnosis: Diagnosis, *sites: Site) -> list[str]:
     return out
 
 
+def kinds_doubted(diagnosis: Diagnosis) -> bool:
+    """Return whether each kind of many small errors is likelier wrong than right by itself."""
+    kinds = [one for one in diagnosis.causes if one.name and not one.rest]
+    return bool(diagnosis.families) and all(one.probability <= LIKELIER for one in kinds)
+
+
 def open_sites(diagnosis: Diagnosis) -> set[Site]:
     """Return the sites that stand in a set with others."""
     return {site for group in open_sets(diagnosis) for site in group}

@@ -21,6 +21,7 @@ from weld_twin_nodes.wording.words import (
     cause,
     cause_by_site,
     effect_name,
+    kinds_doubted,
     listed,
     not_to_be_tried,
     open_sets,
@@ -43,6 +44,10 @@ TOGETHER = (
     'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
     'certain, their sum is.'
 )
+_NONE_ALONE = (
+    'Enter none of them by itself in the controller: each is likelier wrong than right, and what '
+    'stands in for another error mends nothing elsewhere.'
+)
 
 
 def worth_doing(diagnosis: Diagnosis, rule: Rule | None = None) -> list[str]:
@@ -62,6 +67,8 @@ def _with_these(diagnosis: Diagnosis, rule: Rule | None) -> list[str]:
     """Return what to do with what was found."""
     if diagnosis.status == 'unknown' and not diagnosis.actions:
         return _looking(diagnosis)
+    if kinds_doubted(diagnosis):
+        return [TOGETHER, _NONE_ALONE]
     if diagnosis.families and len(diagnosis.actions) > _LARGEST:
         more = len(diagnosis.actions) - _LARGEST
         smaller = f'{more} smaller ones are in diagnosis.json.'

@@ -126,5 +126,13 @@ class BagWriter:
 
 
 def custom_data(provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Return provenance as a bag's ``custom_data`` holds it."""
-    return {PROVENANCE_PREFIX + key: json.dumps(value) for key, value in provenance.items()}
+    """
+    Return provenance as a bag's ``custom_data`` holds it: JSON without an apostrophe.
+
+    A text with one is put between double quotes in ``metadata.yaml``, and where such a line is broken
+    behind a backslash, ruamel.yaml reads another text than it wrote.
+    """
+    return {
+        PROVENANCE_PREFIX + key: json.dumps(value).replace("'", r'\u0027')
+        for key, value in provenance.items()
+    }

@@ -181,6 +181,14 @@ def test_provenance_is_read_back(tmp_path, robot, recording, storage):
 # Writing -------------------------------------------------------------------------------------
 
 
+def test_notes_are_read_back_wherever_a_line_of_the_metadata_is_broken(tmp_path):
+    row = "it's [\N{DEGREE SIGN}], a [\N{DEGREE SIGN}] " * 9
+    told = {f'{k} letters': 'x' * k + row for k in range(60)}
+    with BagWriter(tmp_path / 'bag', provenance=told) as bag:
+        bag.write_all(())
+    assert provenance(tmp_path / 'bag') == told
+
+
 def test_nothing_is_overwritten(tmp_path, robot, recording):
     (tmp_path / 'bag').mkdir()
     with pytest.raises(DataError, match=r"bag' exists already and is not overwritten$"):

@@ -74,10 +74,14 @@ def test_a_recording_survives_the_bag_its_single_file_and_the_loss_of_metadata(
     (note,) = read_recording(bag, replace(robot, name='other')).notes
     assert f"of robot '{robot.name}', and 'other' was given" in note
     (file,) = (path for path in bag.iterdir() if path.suffix != '.yaml')
+    told = provenance(bag)
     alone = shutil.copy(file, tmp_path / f'alone{file.suffix}')
+    write_recording(tmp_path / 'another', recording, robot, provenance={'static': None})
+    beside = shutil.copy(file, tmp_path / 'another' / f'beside{file.suffix}')
     (bag / 'metadata.yaml').unlink()
-    for place in (alone, bag):
+    for place in (alone, beside, bag):  # what its writer said of it goes along with the file
         assert_same(read_recording(place, robot), recording)
+        assert provenance(place) == told
 
 
 def test_another_reader_finds_the_same_numbers(tmp_path, robot, recording):
@@ -403,7 +407,7 @@ def test_a_smooth_motion_measured_at_every_joint_state_is_not_static(tmp_path, r
     t = np.arange(200) * 0.01
     q = np.stack([np.sin(t), np.cos(t)], axis=1)
     motion = Recording('m', JointMotion(t, q), Measurements(t, np.ones((200, 3))))
-    write_recording(tmp_path / 'bag', motion, robot)
+    write_recording(tmp_path / 'bag', motion, robot, provenance={'static': None})
     shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
     assert not read_recording(tmp_path / 'alone.mcap', robot).joints.static
 
@@ -420,7 +424,7 @@ def test_joint_states_of_two_arms_in_turn_are_refused_and_a_garbled_one_is_not(
     other = np.concatenate([q, np.zeros((both.size - t.size, 2))])
     motion = JointMotion(both[order], other[order])
     mixed = Recording('mixed', motion, Measurements(t, np.ones((200, 3))))
-    write_recording(tmp_path / 'bag', mixed, robot)
+    write_recording(tmp_path / 'bag', mixed, robot, provenance={'static': None})
     alone = shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
     if every == 150:
         assert read_recording(alone, robot).joints.t.size == 201
@@ -435,7 +439,7 @@ def test_stations_with_home_between_them_are_no_two_arms(lap, tmp_path, robot):
     q = still.joints.q.copy()
     q[::lap] = 0.5
     home = replace(still, joints=JointMotion(still.joints.t, q))
-    write_recording(tmp_path / 'bag', home, robot)
+    write_recording(tmp_path / 'bag', home, robot, provenance={'static': None})
     shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
     assert read_recording(tmp_path / 'alone.mcap', robot).joints.static
 

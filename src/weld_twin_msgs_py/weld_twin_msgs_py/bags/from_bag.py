@@ -169,7 +169,7 @@ def read_recording(
         robot,
         samples,
         wrench_frame=intake.wrench_frame.meaning,
-        static=bool(made['static']) if 'static' in made else None,
+        static=made.get('static'),
         one_clock=one_clock,
         notes=_of_another(made, robot) + _notes(names, streams, intake, bool(points)),
     )

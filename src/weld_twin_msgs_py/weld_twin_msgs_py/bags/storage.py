@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a path to a bag stands for: its storage files, and what is said about them."""
 
+import sqlite3
+from contextlib import closing, suppress
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import yaml
+from mcap.reader import make_reader
 
 from weld_twin_core.errors import DataError
 
@@ -44,8 +47,8 @@ def look(path: Path) -> Bag:
             raise DataError(
                 f"'{path}' is no bag: expected a rosbag2 directory, a .mcap or a .db3 file{hint}"
             )
-        custom = _information(path.parent).get('custom_data') or {}
-        return Bag([path], custom if isinstance(custom, dict) else {})
+        made = _information(path.parent)
+        return Bag([path], _custom(made) if path.name in _named(made) else _within(path))
     if (path / METADATA).exists():
         return _listed(path)
     files = storage_files(path)
@@ -53,7 +56,7 @@ def look(path: Path) -> Bag:
         raise DataError(
             f"'{path}' is no bag: it holds neither metadata.yaml nor a .mcap or .db3 file"
         )
-    return Bag(files, {})
+    return Bag(files, _within(files[-1]))
 
 
 def refuse_unfinished(path: Path) -> None:
@@ -83,16 +86,40 @@ def _number(file: Path) -> int:
 def _listed(path: Path) -> Bag:
     """Return the files that the metadata lists; only their names count, never their folders."""
     made = _information(path)
-    names = [PurePath(str(name)).name for name in made['relative_file_paths']]
-    files = [path / name for name in names]
+    files = [path / name for name in _named(made)]
     for file in files:
         if not file.is_file():
             raise ValueError(f'metadata.yaml lists {file.name!r}, which is not there')
         if file.suffix not in (*SUFFIXES, PACKED):
             raise ValueError(f'metadata.yaml lists {file.name!r}, which is no storage file')
     mode = str(made.get('compression_mode') or '').lower()
+    return Bag(files, _custom(made), mode == 'message')
+
+
+def _named(made: dict[str, Any]) -> list[str]:
+    """Return the names of the files that metadata lists."""
+    return [PurePath(str(name)).name for name in made['relative_file_paths']] if made else []
+
+
+def _custom(made: dict[str, Any]) -> dict[str, str]:
     custom = made.get('custom_data') or {}
-    return Bag(files, custom if isinstance(custom, dict) else {}, mode == 'message')
+    return custom if isinstance(custom, dict) else {}
+
+
+def _within(file: Path) -> dict[str, str]:
+    """Return the ``custom_data`` that a storage file has in itself, as rosbag2 writes it at its end."""
+    with suppress(Exception):  # of what is damaged the messages tell, or there is nothing to tell
+        if file.suffix == '.mcap':
+            with file.open('rb') as stream:
+                records = make_reader(stream).iter_metadata()
+                texts = [each.metadata['serialized_metadata'] for each in records]
+        else:
+            with closing(sqlite3.connect(f'{file.absolute().as_uri()}?mode=ro', uri=True)) as base:
+                texts = [
+                    row[0] for row in base.execute('SELECT metadata FROM metadata ORDER BY id')
+                ]
+        return _custom(_parsed(texts[-1].encode()))
+    return {}
 
 
 def _information(folder: Path) -> dict[str, Any]:
@@ -102,12 +129,15 @@ def _information(folder: Path) -> dict[str, Any]:
         return {}
     if file.stat().st_size > SIZE_LIMIT:
         raise ValueError(f'metadata.yaml is larger than {SIZE_LIMIT / 1e6:g} MB')
-    data = file.read_bytes()
-    _refuse_deep(data)
-    made = yaml.load(data, Loader=_Loader)[INFORMATION]
+    made = _parsed(file.read_bytes())[INFORMATION]
     if not isinstance(made, dict):
         raise ValueError('metadata.yaml is no mapping')
     return made
+
+
+def _parsed(data: bytes) -> Any:
+    _refuse_deep(data)
+    return yaml.load(data, Loader=_Loader)
 
 
 def _refuse_deep(data: bytes) -> None:

@@ -63,8 +63,8 @@ _MOVE = re.compile(
 _ACTS = re.compile(r'(?:DO|AO|GO|Sync)\Z', re.I)
 """Ends the name of a move that says behind its tool what happens at its point."""
 _OTHER = re.compile(
-    r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|SoftAct|SoftDeact|EGMRun\w+|Ind[ARCD]Move|StepBwdPath|'
-    r'PathRecMove\w+|MoveExtJ)\b',
+    r'\b(PDispOn|PDispSet|PDispOff|EOffsOn|EOffsSet|EOffsOff|SoftAct|SoftDeact|'
+    r'EGMRun\w+|Ind[ARCD]Move|StepBwdPath|PathRecMove\w+|MoveExtJ)\b',
     re.I,
 )
 """What shifts the points after it, or moves the arm and names neither tool nor point."""

@@ -19,6 +19,7 @@ from weld_twin_core.diagnosis.soundness.slips import Slip
 from weld_twin_core.effects import REGISTRY, JointOffset, effects_from_list
 from weld_twin_core.effects.dated import InstrumentKnock, of_the_robot
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion
 
 
 def looked_at(robot, *recordings, align=('base', 'tool'), apply=False):
@@ -41,6 +42,18 @@ def run(ur5, rng):
     """Return the same robot in motion, points only."""
     real = ur5.with_frames(base=anywhere(rng, 2.0))
     return recorded(real, moving(ur5, rng), rng, points=True)
+
+
+@pytest.mark.parametrize('joint', range(6))
+def test_joints_swept_one_after_the_other_show_the_sign_of_each(ur5, rng, joint):
+    home = np.array([0.4, -1.2, 1.4, -1.0, -1.3, 0.3])
+    q = np.concatenate([home + np.outer(np.linspace(-0.9, 0.9, 9), row) for row in np.eye(6)])
+    real = ur5.with_frames(base=anywhere(rng, 2.0), tool=anywhere(rng, 0.1))
+    swept = recorded(real, JointMotion(np.arange(float(len(q))), q, static=True), rng)
+    assert not looked_at(ur5, swept).unsound
+    turned = rejointed(swept, q * np.where(np.arange(6) == joint, -1.0, 1.0))
+    (found,) = looked_at(ur5, turned).unsound
+    assert (found.kind, found.at) == ('sign', (ur5.joint_names[joint],))
 
 
 def test_what_cannot_be_worked_with_is_refused_with_the_reason(ur5, placed, run):

@@ -10,6 +10,7 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...recording import Recording
@@ -17,7 +18,7 @@ from ..algebra.problem import ROWS, Model, Problem
 from ..frames.alignment import refined
 from ..result import Unsound
 from .lag import Lag, lag
-from .lengths import distance, middle
+from .lengths import distance, middle_of_each, swept
 from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Rest, Settling, Slip, changes, rest_of
@@ -72,8 +73,12 @@ class Case:
 
     @cached_property
     def gap(self) -> float:
-        """Return the median distance between measured and twin [m]."""
-        return middle(self.residuals)
+        """Return the median distance between measured and twin [m], or where a joint was swept."""
+        return middle_of_each([distance(part) for part in self.residuals], self.swept)
+
+    @cached_property
+    def swept(self) -> tuple[NDArray[np.bool_], ...]:
+        return swept([r.joints.at(r.seen.t)[0] for r in self.recordings])
 
     @cached_property
     def tool_fixed(self) -> bool:

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...recording import Recording
+from .limits import MOVED, RUN
 
 
 def distance(part: Array) -> Array:
@@ -20,6 +22,25 @@ def distance(part: Array) -> Array:
 def middle(parts: Sequence[Array]) -> float:
     """Return the median length of the position part of residuals (c, M) [m]."""
     return float(np.median(np.concatenate([distance(part) for part in parts])))
+
+
+def swept(motions: Sequence[Array]) -> tuple[NDArray[np.bool_], ...]:
+    """
+    Return the samples in which a joint moved that rests in most others, for each such joint.
+
+    Where joints are swept one after the other, what is wrong with one of them shows in these alone.
+
+    motions: joints (M, n) of every recording.
+    """
+    q = np.concatenate(motions)
+    moved = np.abs(q - np.median(q, axis=0)) > MOVED
+    return tuple(own for own in moved.T if RUN <= np.count_nonzero(own) < len(q) // 2)
+
+
+def middle_of_each(sizes: Sequence[Array], some: Iterable[NDArray[np.bool_]]) -> float:
+    """Return the median of what every recording has of each sample, or that of some if it is more."""
+    whole = np.concatenate(sizes)
+    return max([float(np.median(whole)), *(float(np.median(whole[own])) for own in some)])
 
 
 def length(value: float) -> str:

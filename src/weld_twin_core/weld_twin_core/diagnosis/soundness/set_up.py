@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
@@ -21,12 +22,12 @@ from ...effects.dated import InstrumentKnock
 from ...effects.geometry import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
-from .lengths import falls, length, listed
+from .lengths import falls, length, listed, middle_of_each
 from .limits import CLEAR, FEW, HALVED, NOISE, PARTED, TILTED, WRONG
 from .mending import differing
 from .slips import TAKEN_UP, Settling, Slip
 from .snapshot import Arm, Snapshot
-from .suspicions import conventions
+from .suspicions import conventions, suspicions
 
 TORCH = 0.1
 """Distance [m] at which a turn of the tool is compared with a shift: a marker's, a torch's."""
@@ -143,17 +144,21 @@ def _angle(turn: float) -> str:
 
 def orientation(case: Case) -> Sequence[Finding]:
     """Return what is wrong with orientations while positions are right."""
-    if _median_angle(case.residuals) < WRONG:
+    if _median_angle(case.residuals, case.swept) < WRONG:
         return ()
     shot = case.snapshot
     turned = disagreement(shot, shot.framed)
     if turned < WRONG:
         return ()
-    for suspicion in conventions():
+    # A joint whose axis goes through the tool turns it, and moves it nowhere.
+    names = shot.robot.joint_names
+    signs = (one for one in suspicions(shot.robot) if one.kind == 'sign' and one.at[0] in names)
+    for suspicion in (*conventions(), *signs):
         assert suspicion.mend is not None
         trial = shot.mended(suspicion.mend)
         if CLEAR * disagreement(trial, trial.framed) < turned:
-            sentence = f'{suspicion.sentence}; undone, they agree with the joints.'
+            words = f'{suspicion.sentence[0].upper()}{suspicion.sentence[1:]}'
+            sentence = f'{words}; undone, orientations agree with the joints.'
             return (suspicion._replace(sentence=sentence),)
     return (
         warning(
@@ -165,12 +170,13 @@ def orientation(case: Case) -> Sequence[Finding]:
 
 def disagreement(shot: Snapshot, model: Model) -> float:
     """Return the median angle [rad] that a model leaves of orientations; 0 where none are."""
-    return _median_angle(shot.problem.residuals(model))
+    return _median_angle(shot.problem.residuals(model), shot.swept)
 
 
-def _median_angle(parts: Sequence[Array]) -> float:
+def _median_angle(parts: Sequence[Array], some: Sequence[NDArray[np.bool_]]) -> float:
     angles = [np.linalg.norm(part[3:], axis=0) for part in parts if len(part) > 3]
-    return float(np.median(np.concatenate(angles))) if angles else 0.0
+    whole = len(angles) == len(parts)
+    return middle_of_each(angles, some if whole else ()) if angles else 0.0
 
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_vector
@@ -29,7 +30,7 @@ from ...recording import JointMotion, Recording
 from ..algebra.fit import effect_precision, fit, robust_scale
 from ..algebra.problem import Anchor, Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
-from .lengths import middle
+from .lengths import distance, middle_of_each, swept
 from .limits import CLEAR, ENOUGH, FAR, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
 from .mending import Given, Mend
 
@@ -52,6 +53,8 @@ class Snapshot:
     model: Model
     align: frozenset[str] = FRAMES
     """Frames that may be anywhere; the others are off by what a frame can be off by."""
+    read: tuple[Array, ...] = ()
+    """Joints as they were read, before anything was undone."""
 
     @property
     def problem(self) -> Problem:
@@ -70,7 +73,17 @@ class Snapshot:
             # What is known of a joint, or differs at it, means nothing on another robot.
             frames = tuple(c for c in model.changes if c.effect.site is None)
             model = replace(model, known=(), changes=frames)
-        return Snapshot(out.recordings, model, out.align)
+        return Snapshot(out.recordings, model, out.align, self._read)
+
+    @property
+    def _read(self) -> tuple[Array, ...]:
+        return self.read or tuple(r.joints.q for r in self.recordings)
+
+    @cached_property
+    def swept(self) -> tuple[NDArray[np.bool_], ...]:
+        """Return the samples in which each joint moved that rests in most others."""
+        same = sum(map(len, self._read)) == sum(r.joints.t.size for r in self.recordings)
+        return swept(self._read if same else [r.joints.q for r in self.recordings])
 
     @cached_property
     def spread(self) -> float:
@@ -102,7 +115,8 @@ class Snapshot:
         return bool(((reads >= low) & (reads <= high)).all())
 
     def gap(self, model: Model) -> float:
-        return middle(self.problem.residuals(model))
+        parts = self.problem.residuals(model)
+        return middle_of_each([distance(part) for part in parts], self.swept)
 
     @cached_property
     def _roughly(self) -> dict[bool, Model]:

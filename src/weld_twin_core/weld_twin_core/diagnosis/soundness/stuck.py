@@ -120,20 +120,21 @@ def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
 
 
 def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:
-    """Return the median gap [m] when joint i may stand anywhere at every measurement."""
+    """Return the gap [m] of all but a few measurements when joint i may stand anywhere at each."""
     seen, twin = recording.seen.take(inside), model.twin(k)
     column = Features(twin, recording, seen.t).column(('q', i)).T
     away = seen.position - twin.poses(recording, seen.t).position
     if model.robot.prismatic[i]:
         along = column[:, :3]
         off = away - (away * along).sum(axis=1, keepdims=True) * along
-        return float(np.median(np.linalg.norm(off, axis=1)))
+        return float(np.quantile(np.linalg.norm(off, axis=1), 1.0 - FEW))
     axis = column[:, 3:]
     lever = np.cross(column[:, :3], axis)
     seen_from_axis = away + lever
     along = (seen_from_axis * axis).sum(axis=1)
     out = np.linalg.norm(seen_from_axis - along[:, None] * axis, axis=1)
-    return float(np.median(np.hypot(along, out - np.linalg.norm(lever, axis=1))))
+    off = np.hypot(along, out - np.linalg.norm(lever, axis=1))
+    return float(np.quantile(off, 1.0 - FEW))
 
 
 def _when(recording: Recording, start: int, end: int) -> str:

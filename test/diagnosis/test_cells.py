@@ -14,6 +14,7 @@ import re
 import numpy as np
 import pytest
 import yaml
+from command_line import done, refused
 from diagnosis_cells import all_but
 from scipy.spatial.transform import Rotation
 
@@ -89,9 +90,9 @@ def robot_file(tmp_path):
 
 def diagnosed(place, robot, *more, without=OTHERS):
     bag, out = place / 'bag', place / 'found'
-    assert commanded('import', place / 'cell.csv', '--robot', robot, *more, '--out', bag) == 0
+    done('import', place / 'cell.csv', '--robot', robot, *more, '--out', bag)
     words = ('--exclude-effect', *without) if without else ()
-    assert commanded('diagnose', bag, '--robot', robot, *more, *words, '--out', out) == 0
+    done('diagnose', bag, '--robot', robot, *more, *words, '--out', out)
     return json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))
 
 
@@ -141,7 +142,7 @@ def test_programs_without_external_axes_refuse_a_positioner_in_one_sentence(
 ):
     (tmp_path / 'p.script').write_text('def p():\nend\n', encoding='utf-8')
     words = ('correct', tmp_path / 'p.script', '--robot', robot_file)
-    assert commanded(*words, '--out', tmp_path / 'o') == 2
+    refused(*words, '--out', tmp_path / 'o')
     said = capfd.readouterr().err
     assert said.startswith('weld-twin: external axes of urscript are not known here')
     assert '(turn, tilt)' in said
@@ -171,7 +172,7 @@ def test_a_mistake_of_a_cell_has_its_name(tmp_path, mistake):
         csv.writer(file).writerows(rows)
     robot, bag, out = tmp_path / 'cell.yaml', tmp_path / 'bag', tmp_path / 'found'
     robot.write_text(yaml.safe_dump(cell), encoding='utf-8')
-    assert commanded('import', table, '--robot', robot, '--out', bag) == 0
+    done('import', table, '--robot', robot, '--out', bag)
     assert commanded('diagnose', bag, '--robot', robot, '--out', out) == 3
     (told,) = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))['unsound']
     assert (told['kind'], told['at']) == (MISTAKES[mistake][0], [MISTAKES[mistake][1]])
@@ -266,10 +267,10 @@ def test_two_arms_calibrate_each_other_by_a_ball_in_sockets(tmp_path):
     artefact.write_text(yaml.safe_dump({'contacts': sockets, 'distances': ties}))
     robot.write_text(json.dumps(ARMS['right'] | {'workpiece': ARMS['left']}))
     words = ('import', tmp_path / 'touches.csv', '--contacts', artefact, '--robot', robot)
-    assert commanded(*words, '--out', tmp_path / 'bag') == 0
+    done(*words, '--out', tmp_path / 'bag')
     words = ('diagnose', tmp_path / 'bag', '--robot', robot, '--align', 'tool')
     words += ('--exclude-effect', *OTHERS)
-    assert commanded(*words, '--out', tmp_path / 'found') == 0
+    done(*words, '--out', tmp_path / 'found')
     found = json.loads((tmp_path / 'found' / 'diagnosis.json').read_text(encoding='utf-8'))
     for joint, offset in off.items():
         assert any(('joint_offset', joint) in one for one in names(found))

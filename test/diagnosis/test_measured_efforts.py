@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import done, refused
 from diagnosis_cells import all_but
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
@@ -103,16 +104,14 @@ def test_the_same_springs_by_statics_do_not():
     assert np.median(np.linalg.norm(off, axis=1)) > 5.0 * SIGMA * 3**0.5
 
 
-def test_a_model_by_effort_is_replayed_by_it_and_refuses_without(cell, tmp_path, capsys):
+def test_a_model_by_effort_is_replayed_by_it_and_refuses_without(cell, tmp_path):
     words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
-    assert commanded('simulate', cell / 'bag', *words, '--out', tmp_path / 'twin') == 0
-    told = capsys.readouterr().out
-    assert float(told.split('RMS ')[1].split(' mm')[0]) < 0.07
+    said = done('simulate', cell / 'bag', *words, '--out', tmp_path / 'twin')
+    assert float(said.split('RMS ')[1].split(' mm')[0]) < 0.07
     bare = replace(read_recording(cell / 'bag', ROBOT), effort=None)
     write_recording(tmp_path / 'bare', bare, ROBOT)
-    assert commanded('simulate', tmp_path / 'bare', *words, '--out', tmp_path / 'none') == 2
-    error = capsys.readouterr().err
-    assert 'the joint state tells no effort' in error and error.count('\n') == 1
+    said = refused('simulate', tmp_path / 'bare', *words, '--out', tmp_path / 'none')
+    assert 'the joint state tells no effort' in said
     assert not (tmp_path / 'none').exists()
 
 
@@ -126,12 +125,12 @@ def test_a_running_twin_takes_the_efforts_as_the_twin_over_the_bag_does(cell):
     np.testing.assert_allclose(got, offline.position, rtol=0.0, atol=1e-12)
 
 
-def test_a_program_is_not_corrected_by_efforts_to_come(cell, tmp_path, capsys):
+def test_a_program_is_not_corrected_by_efforts_to_come(cell, tmp_path):
     program = tmp_path / 'joints.csv'
     program.write_text(','.join(ROBOT.joint_names) + '\n0,-1.2,1,0,0,0\n0.1,-1.2,1,0,0,0\n')
     words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
-    assert commanded('correct', program, *words, '--out', tmp_path / 'better') == 2
-    assert 'a motion that is still to come has none' in capsys.readouterr().err
+    said = refused('correct', program, *words, '--out', tmp_path / 'better')
+    assert 'a motion that is still to come has none' in said
 
 
 def in_bag(tmp_path, effort, holds=True):

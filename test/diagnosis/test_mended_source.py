@@ -10,6 +10,7 @@ import json
 
 import numpy as np
 import pytest
+from command_line import done
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
@@ -101,8 +102,8 @@ def test_a_prediction_on_the_same_source_mends_it_as_the_diagnosis_did(kind, tmp
     assert content['unsound'][0]['applied'] and content['unsound'][0]['mend']['do']
     capsys.readouterr()
     model = ('--model', found / 'diagnosis.json')
-    assert run('simulate', *words, *model, '--out', tmp_path / 'out') == 0
-    assert float(capsys.readouterr().out.split('RMS ')[1].split(' mm')[0]) < 0.06
+    said = done('simulate', *words, *model, '--out', tmp_path / 'out')
+    assert float(said.split('RMS ')[1].split(' mm')[0]) < 0.06
     assert apart(tmp_path / 'out', tmp_path / 'rec') < 8e-5
     corrected = read_robot_yaml(found / 'robot.yaml')
     if kind in ('zero', 'turn'):
@@ -126,12 +127,12 @@ def swapped(tmp_path_factory):
     return folder
 
 
-def test_a_source_that_was_put_right_meanwhile_is_left_as_it_is(swapped, tmp_path, capsys):
+def test_a_source_that_was_put_right_meanwhile_is_left_as_it_is(swapped, tmp_path):
     _, q = stations(6, 12)
     write_recording(tmp_path / 'right', still(q, true_points(q)), GIVEN)
     words = ('--robot', swapped / 'robot.yaml', '--model', swapped / 'found' / 'diagnosis.json')
-    assert run('simulate', tmp_path / 'right', *words, '--out', tmp_path / 'out') == 0
-    assert 'needs no mending any more' in capsys.readouterr().out
+    said = done('simulate', tmp_path / 'right', *words, '--out', tmp_path / 'out')
+    assert 'needs no mending any more' in said
     assert apart(tmp_path / 'out', tmp_path / 'right') < 6e-5
 
 
@@ -141,7 +142,7 @@ def test_commands_of_the_same_source_come_back_counted_as_they_came(swapped, tmp
     commands = Recording('plan', JointMotion(5.0 * np.arange(12), q[:, order], static=True))
     write_recording(tmp_path / 'plan', commands, GIVEN)
     words = ('--robot', swapped / 'robot.yaml', '--model', swapped / 'found' / 'diagnosis.json')
-    assert run('correct', tmp_path / 'plan', *words, '--out', tmp_path / 'better') == 0
+    done('correct', tmp_path / 'plan', *words, '--out', tmp_path / 'better')
     better = read_recording(tmp_path / 'better', GIVEN).joints.q
     wanted = np.array([tool_pose(ROBOT, row, TOOL)[:3, 3] for row in q])
     off = np.linalg.norm(true_points(better[:, order]) - wanted, axis=1)

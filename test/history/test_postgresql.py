@@ -8,10 +8,10 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
+from command_line import done, refused
 from own_postgres import NoServer, postgres
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, Entry
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
@@ -58,9 +58,8 @@ def entries():
 
 
 def told(url, cell):
-    said = weld_twin('history', 'changed', '--cell', cell, '--db', url, '--json')
-    assert said.code == 0, said.err
-    return json.loads(said.out)
+    said = done('history', 'changed', '--cell', cell, '--db', url, '--json')
+    return json.loads(said)
 
 
 def filled(url, cell):
@@ -100,7 +99,6 @@ def test_a_second_user_adds_to_what_the_first_has_made(server):
 
 def test_a_server_that_is_gone_is_told_in_a_sentence(tmp_path):
     url = f'postgresql+psycopg://weld:secret@/postgres?host={tmp_path}'
-    said = weld_twin('history', 'show', '--db', url)
-    assert said.code == 2
-    assert 'cannot be used' in said.err and 'No such file or directory' in said.err
-    assert 'secret' not in said.err
+    said = refused('history', 'show', '--db', url)
+    assert 'cannot be used' in said and 'No such file or directory' in said
+    assert 'secret' not in said

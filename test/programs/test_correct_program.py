@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from command_line import done, refused, weld_twin
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
 from weld_twin_lab.programs import plain_readers as readers
 from weld_twin_lab.programs.plain_controller import along, joints_for, tool_pose
 from weld_twin_msgs_py.robots import write_robot_yaml
-from weld_twin_nodes.cli.in_process import weld_twin
 
 MADE = Path(__file__).parent / 'made'
 CELLS = {
@@ -97,11 +97,10 @@ def unmarked(folder, language):
 @pytest.mark.parametrize('language', CELLS)
 def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
     robot, files, _, _ = CELLS[language]
-    said = weld_twin(
+    done(
         *('correct', MADE / files[0], '--robot', robot, '--out', tmp_path / 'out'),
         *OPTIONS.get(language, []),
     )
-    assert said.code == 0, said.err
     for name in files:
         assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
 
@@ -113,25 +112,25 @@ def test_a_program_that_was_cut_off_is_refused(language, tmp_path):
         (tmp_path / name).write_bytes((MADE / name).read_bytes())
     path = tmp_path / files[0]
     path.write_bytes(path.read_bytes().rstrip()[:-9].rstrip())
-    said = weld_twin('correct', path, '--robot', robot, '--out', tmp_path / 'out')
-    assert said.code == 2 and 'is the file cut off?' in said.err
+    said = refused('correct', path, '--robot', robot, '--out', tmp_path / 'out')
+    assert 'is the file cut off?' in said
 
 
 def test_points_in_two_files_of_one_name_are_refused(tmp_path):
     for name, copy in (('.src', '.src'), ('.dat', '.dat'), ('.dat', '.DAT')):
         (tmp_path / f'bracket{copy}').write_bytes((MADE / f'bracket{name}').read_bytes())
     words = ('correct', tmp_path / 'bracket.src', '--robot', 'kuka_kr16_2')
-    said = weld_twin(*words, '--out', tmp_path / 'out')
-    assert said.code == 2 and "bracket.DAT' and 'bracket.dat' both belong" in said.err
+    said = refused(*words, '--out', tmp_path / 'out')
+    assert "bracket.DAT' and 'bracket.dat' both belong" in said
 
 
 def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
-    said = weld_twin(
+    said = refused(
         *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
         *('--out', tmp_path / 'out'),
     )
-    assert said.code == 2 and '--pulses-per-degree' in said.err
-    assert said.err.count('\n') == 1 and not (tmp_path / 'out').exists()
+    assert '--pulses-per-degree' in said
+    assert said.count('\n') == 1 and not (tmp_path / 'out').exists()
 
 
 @pytest.mark.parametrize('language', CELLS)
@@ -139,11 +138,10 @@ def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(langu
     name, files, reader, near = CELLS[language]
     robot = wt.load(name)
     (tmp_path / 'found.yaml').write_text(effects(robot))
-    said = weld_twin(
+    said = done(
         *('correct', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
     )
-    assert said.code == 0, said.err
     before, after = (reader(texts(folder, files)) for folder in (MADE, tmp_path / 'out'))
     assert [word for word, _ in before] == [word for word, _ in after]
     tool = tool_of(robot, language)
@@ -168,11 +166,11 @@ def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(langu
     (tmp_path / 'elsewhere').mkdir()
     for file in files:
         (tmp_path / 'out' / file).rename(tmp_path / 'elsewhere' / file)
-    said = weld_twin(
+    said = refused(
         *('correct', tmp_path / 'elsewhere' / files[0], '--robot', name, '--out', tmp_path / 'b'),
         *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
     )
-    assert said.code == 2 and 'was corrected already' in said.err and not (tmp_path / 'b').exists()
+    assert 'was corrected already' in said and not (tmp_path / 'b').exists()
 
 
 def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-4):
@@ -228,11 +226,10 @@ def test_what_is_expected_counts_the_way_and_what_an_encoder_rounds(tmp_path):
         f'- {{effect: joint_offset, {pan}, offset: {off}}}\n'
         f'- {{effect: quantization, {pan}, step: {step}}}\n'
     )
-    said = weld_twin(
+    done(
         *('correct', tmp_path / 'out.script', '--robot', 'ur5', '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'found.yaml', '--max-correction', '5mm', '1deg'),
     )
-    assert said.code == 0, said.err
     expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
     before, after = (expected[when]['rms_m'] for when in ('before', 'after'))
     along = np.linspace(0.4, 0.7, 3001)
@@ -424,14 +421,13 @@ def test_an_axis_that_would_pass_where_a_flag_changes_is_left(
     )
     off = f'- {{effect: joint_offset, joint: {arm.joint_names[axis - 1]}, offset: 1e-3}}'
     (tmp_path / 'off.yaml').write_text(off)
-    said = weld_twin(
+    said = done(
         *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'off.yaml'),
         *(['--tool', '1=0,0,0,0,0,0'] if height else []),
         *(['--pulses-per-degree', ','.join(['1000'] * 6)] if name == 'p.jbi' else []),
     )
-    assert said.code == 0, said.err
-    assert (f'axis {axis} would pass an angle at which the flags' in said.out) == left, said.out
+    assert (f'axis {axis} would pass an angle at which the flags' in said) == left, said
 
 
 def test_the_start_is_given_as_the_pendant_shows_it(tmp_path):
@@ -472,11 +468,11 @@ def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
     unsound = {'schema': 'weld_twin/diagnosis/1', 'unsound': [{'sentence': 'joints are swapped'}]}
     for data, words in ((content, "of the robot 'ur10'"), (unsound, 'were unsound: joints are')):
         (tmp_path / 'diagnosis.json').write_text(json.dumps(data))
-        said = weld_twin(
+        said = refused(
             *('correct', tmp_path / 'seam.script', '--robot', 'ur5'),
             *('--model', tmp_path / 'diagnosis.json', '--out', tmp_path / 'out'),
         )
-        assert said.code == 2 and words in said.err
+        assert words in said
 
 
 def a_line_on_which_a_joint_turns_around(tmp_path, found):
@@ -525,11 +521,11 @@ def test_what_play_spoils_is_corrected_without_it(tmp_path):
 def test_a_correction_finer_than_the_language_writes_is_none(tmp_path):
     found = [{'effect': 'joint_offset', 'joint': 'joint_2_l', 'offset': 4e-6}]
     (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
-    said = weld_twin(
+    said = refused(
         *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
         *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml', *OPTIONS['inform']),
     )
-    assert said.code == 2 and 'too little is gained' in said.err
+    assert 'too little is gained' in said
 
 
 def test_a_model_with_nothing_to_mend_moves_no_point_and_says_so(tmp_path):

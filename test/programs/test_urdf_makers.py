@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from command_line import done
 from scipy.spatial.transform import Rotation
 
 from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_nodes.cli.in_process import weld_twin
 
 pin = pytest.importorskip('pinocchio', reason='the arms are worked out by another library')
 
@@ -87,9 +87,7 @@ class Arm:
 
 def command(name, maker, *more):
     robot = MAKERS / f'{maker}.urdf'
-    said = weld_twin(*name.split(), *more, '--robot', robot, '--tip-link', 'tcp')
-    assert said.code == 0, said.err
-    return said
+    return done(*name.split(), *more, '--robot', robot, '--tip-link', 'tcp')
 
 
 def test_every_makers_arm_is_planned_for_and_simulated(tmp_path):

@@ -6,8 +6,8 @@ import os
 import stat
 
 import pytest
+from command_line import refused, weld_twin
 
-from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.serve.directory import Directory
 from weld_twin_report.serve.job import Asked, Job
 
@@ -113,6 +113,6 @@ def test_a_place_that_cannot_be_a_directory_is_a_sentence(tmp_path):
 
 @pytest.mark.parametrize('port', [99_999, 65_536, -1])
 def test_a_port_that_is_none_is_refused(tmp_path, port):
-    result = weld_twin('serve', f'--port={port}', '--dir', tmp_path / 'served')
-    assert result.code == 2 and f'--port takes 0 to 65535, got {port}' in result.err
+    result = refused('serve', f'--port={port}', '--dir', tmp_path / 'served')
+    assert f'--port takes 0 to 65535, got {port}' in result
     assert not (tmp_path / 'served').exists()

@@ -11,9 +11,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
+from command_line import done
 from served import Person, Server, fill, small_disk, until
 
-from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database
 from weld_twin_report.serve import Settings
 from weld_twin_report.serve.job import Asked, Job
@@ -260,8 +260,7 @@ def test_a_program_is_corrected_in_the_browser_as_on_the_command_line(server, tm
     model = tmp_path / 'diagnosis.json'
     model.write_text(person.get(f'{address}/diagnosis.json')[2])
     words = ('--model', model, '--max-correction', '1.5mm', '1deg', '--out', tmp_path / 'out')
-    said = weld_twin('correct', program, '--robot', 'ur5', *words)
-    assert said.code == 0, said.err
+    done('correct', program, '--robot', 'ur5', *words)
     assert corrected == (tmp_path / 'out' / program.name).read_text() != program.read_text()
     back = {**told, 'files': [('seam (1).yaml', corrected.encode())]}
     _, again, _ = person.drop('/program', **back)

@@ -9,8 +9,8 @@ import subprocess
 import sys
 
 import pytest
+from command_line import done, weld_twin
 
-from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_nodes.cli.main import OLD, parser_of, renamed
 
 SCREEN = 40
@@ -22,9 +22,7 @@ def help_of(monkeypatch):
     monkeypatch.setenv('COLUMNS', '80')
 
     def shown(*words):
-        said = weld_twin(*words)
-        assert said.code == 0, said.err
-        return said.out
+        return done(*words)
 
     return shown
 
@@ -79,7 +77,7 @@ def typed_of_old(place):
     robot = ('--robot', 'ur5')
     (place / 'none.yaml').write_text('[]\n')
     seam = (*robot, '--rate', 10, '--out', place / 'seam')
-    assert weld_twin('simulate', *seam).code == 0
+    done('simulate', *seam)
     model = (*robot, '--model', place / 'none.yaml')
     program = (*robot, '--controller', 'urscript', '--out', place / 'a.script')
     limits = ('--tolerance', 0.5, '--postures', 24, '--out', place / 'plan')
@@ -130,14 +128,13 @@ def test_an_old_spelling_does_what_the_new_one_does_and_says_it_once(tmp_path):
 
 @pytest.mark.parametrize('name', sorted(OLD))
 def test_every_old_spelling_leads_to_a_command_that_there_is(name):
-    usage = weld_twin(name, '--help')
-    assert usage.code == 0, usage.err
-    assert usage.out.startswith(f'usage: weld-twin {OLD[name]} ')
+    usage = done(name, '--help')
+    assert usage.startswith(f'usage: weld-twin {OLD[name]} ')
 
 
 def test_an_option_of_the_other_kind_is_refused_in_one_sentence(tmp_path):
     robot = ('--robot', 'ur5', '--out', tmp_path / 'out')
-    refused = {
+    wrong = {
         ('simulate', tmp_path, '--model', 'm.json', '--seed', 0): '--seed is of a seam',
         ('simulate', '--temperature', 30): '--temperature is of a recording; give a BAG',
         ('simulate', tmp_path): 'say with --model which effects',
@@ -153,10 +150,9 @@ def test_an_option_of_the_other_kind_is_refused_in_one_sentence(tmp_path):
             1,
         ): 'a plan comes before the first recording',
     }
-    for words, sentence in refused.items():
-        said = weld_twin(*words, *robot)
-        assert said.code == 2 and said.err.count('\n') == 1, words
-        assert sentence in said.err, said.err
+    for words, sentence in wrong.items():
+        said = refused(*words, *robot)
+        assert sentence in said, said
 
 
 @pytest.mark.parametrize(('given', 'threads'), [({}, '1'), ({'OPENBLAS_NUM_THREADS': '2'}, '2')])

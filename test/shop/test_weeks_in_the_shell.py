@@ -7,11 +7,11 @@ import json
 
 import numpy as np
 import pytest
+from command_line import done, weld_twin
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm import catalog
 from weld_twin_lab.programs.plain_controller import tool_pose
-from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = 'kuka_kr6_r900'
 MODEL = catalog.load(ROBOT)
@@ -43,12 +43,6 @@ def fill_in(table, error, rng):
         row[-3:] = [f'{value:.4f}' for value in seen]
     with open(table, 'w', newline='', encoding='utf-8') as file:
         csv.writer(file, lineterminator='\n').writerows([head, *rows])
-
-
-def done(*words):
-    said = weld_twin(*words)
-    assert said.code == 0, said.err
-    return said
 
 
 def plan(place, *more):

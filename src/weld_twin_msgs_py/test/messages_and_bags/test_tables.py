@@ -30,10 +30,6 @@ def columns_of(path, delimiter):
     return dict(zip(rows[0], np.array(cells).T, strict=True))
 
 
-def stacked(columns, *names):
-    return np.stack([columns[name] for name in names], axis=1)
-
-
 def poses(robot, count=12, seed=2):
     q = np.random.default_rng(seed).uniform(-2.5, 2.5, (count, robot.n))
     return q, forward(robot, q)

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from command_line import done, refused, weld_twin
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
@@ -33,29 +34,27 @@ def table(tmp_path):
     return file, q, position
 
 
-def test_degrees_and_millimetres_arrive_as_radians_and_metres(weld_twin, tmp_path, table):
+def test_degrees_and_millimetres_arrive_as_radians_and_metres(tmp_path, table):
     file, q, position = table
-    result = weld_twin('import', file, '--robot', 'ur5', '--out', tmp_path / 'bag')
-    assert result.code == 0, result.err
+    result = done('import', file, '--robot', 'ur5', '--out', tmp_path / 'bag')
     recording = read_recording(tmp_path / 'bag', ROBOT)
     assert recording.joints.static
     np.testing.assert_allclose(recording.joints.q, q, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(recording.measured.position, position, rtol=0.0, atol=1e-13)
-    assert 'joint angles are in degrees' in result.out
-    assert 'base and tool frame not fitted: RMS 2.000 mm, max 2.000 mm' in result.out
+    assert 'joint angles are in degrees' in result
+    assert 'base and tool frame not fitted: RMS 2.000 mm, max 2.000 mm' in result
 
 
-def test_a_list_of_numbers_may_begin_with_a_sign(weld_twin, tmp_path, table):
+def test_a_list_of_numbers_may_begin_with_a_sign(tmp_path, table):
     file, q, _ = table
     shifted = ('--joint-offsets', '-5,0,0,0,0,.5', '--joint-signs', '-1,1,1,1,1,1')
-    result = weld_twin('import', file, '--robot', 'ur5', *shifted, '--out', tmp_path / 'bag')
-    assert result.code == 0, result.err
+    done('import', file, '--robot', 'ur5', *shifted, '--out', tmp_path / 'bag')
     expected = q * [-1.0, 1.0, 1.0, 1.0, 1.0, 1.0] + np.radians([-5.0, 0.0, 0.0, 0.0, 0.0, 0.5])
     recording = read_recording(tmp_path / 'bag', ROBOT)
     np.testing.assert_allclose(recording.joints.q, expected, rtol=0.0, atol=1e-13)
 
 
-def test_deviations_come_as_table_and_picture_too(weld_twin, tmp_path, table):
+def test_deviations_come_as_table_and_picture_too(tmp_path, table):
     csv, png = tmp_path / 'off.csv', tmp_path / 'off.png'
     weld_twin(
         'import',
@@ -84,17 +83,13 @@ def test_deviations_come_as_table_and_picture_too(weld_twin, tmp_path, table):
         (('--skip-rows', '99'), 'names row 99'),
     ],
 )
-def test_a_table_misread_is_refused_with_the_option_that_decides(
-    weld_twin, tmp_path, table, words, sentence
-):
-    result = weld_twin('import', table[0], '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
-    assert result.code == 2
-    assert sentence in result.err
-    assert len(result.err.splitlines()) == 1
+def test_a_table_misread_is_refused_with_the_option_that_decides(tmp_path, table, words, sentence):
+    result = refused('import', table[0], '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
+    assert sentence in result
     assert not (tmp_path / 'bag').exists()
 
 
-def test_a_motion_of_two_files_becomes_a_bag_with_two_clocks(weld_twin, tmp_path):
+def test_a_motion_of_two_files_becomes_a_bag_with_two_clocks(tmp_path):
     """Joints at 100 Hz, the tracker at 30 Hz on a clock of its own that is 20 ms late."""
     t, seen = np.arange(0.0, 6.0, 0.01), np.arange(0.5, 5.5, 1.0 / 30.0)
     start = np.array([0.2, -1.3, 1.4, -1.5, -1.4, 0.3])
@@ -110,17 +105,16 @@ def test_a_motion_of_two_files_becomes_a_bag_with_two_clocks(weld_twin, tmp_path
     track = np.column_stack([seen + 7.0, 1e3 * point])
     head = 'time [s],x [mm],y [mm],z [mm]'
     np.savetxt(tmp_path / 'track.csv', track, delimiter=',', header=head, comments='', fmt='%.6f')
-    result = weld_twin('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
+    result = done('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
                        '--clock-offset', 0.5, '--robot', 'ur5', '--out', tmp_path / 'bag')  # fmt: skip
-    assert result.code == 0, result.err
-    assert f'{seen.size} measurements along a motion' in result.out
+    assert f'{seen.size} measurements along a motion' in result
     back = read_recording(tmp_path / 'bag', ROBOT)
     assert not back.joints.static and back.joints.t.size == t.size
     late = forward(ROBOT, back.joints.at(back.measured.t - 0.02)[0])[:, :3, 3]
     assert np.linalg.norm(back.measured.position - late, axis=1).max() < 2e-5
 
 
-def test_a_log_with_gaps_and_repeated_stamps_is_a_motion_all_the_same(weld_twin, tmp_path):
+def test_a_log_with_gaps_and_repeated_stamps_is_a_motion_all_the_same(tmp_path):
     t = np.arange(0.0, 4.0, 0.01)
     q = np.array([0.2, -1.3, 1.4, -1.5, -1.4, 0.3]) + 0.5 * np.sin(t[:, None] + np.arange(6.0))
     lines = [','.join([f'{a:.3f}', *(f'{v:.7f}' for v in b)]) for a, b in zip(t, q, strict=True)]
@@ -132,11 +126,10 @@ def test_a_log_with_gaps_and_repeated_stamps_is_a_motion_all_the_same(weld_twin,
     seen = [','.join([f'{1e3 * a:.0f}', *(f'{v:.5f}' for v in p)])
             for a, p in zip(t[::3], point, strict=True)]  # fmt: skip
     (tmp_path / 'track.csv').write_text('\n'.join(['t [ms],X [mm],Y [mm],Z [mm]', *seen]))
-    result = weld_twin('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
+    result = done('import', tmp_path / 'log.csv', '--measured', tmp_path / 'track.csv',
                        '--robot', 'ur5', '--out', tmp_path / 'bag')  # fmt: skip
-    assert result.code == 0, result.err
-    assert '1 rows are left out in which a joint is missing' in result.out
-    assert '1 rows are left out whose stamp repeats one before' in result.out
+    assert '1 rows are left out in which a joint is missing' in result
+    assert '1 rows are left out whose stamp repeats one before' in result
     back = read_recording(tmp_path / 'bag', ROBOT)
     np.testing.assert_allclose(back.measured.t[:-1], t[::3][:-1], atol=1e-6)
     there = forward(ROBOT, back.joints.at(back.measured.t)[0])[:, :3, 3]

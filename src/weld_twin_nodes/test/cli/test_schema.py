@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from command_line import done, refused, weld_twin
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
@@ -45,11 +46,11 @@ def offset(**keys):
 
 
 @pytest.fixture
-def checks(weld_twin, tmp_path):
+def checks(tmp_path):
     def check(name, data):
         out = tmp_path / 'schema.json'
         if not out.exists():
-            assert weld_twin('export', 'schema', name, '--out', out).code == 0
+            done('export', 'schema', name, '--out', out)
         return jsonschema.Draft7Validator(json.loads(out.read_text())).is_valid(data)
 
     return check
@@ -130,12 +131,12 @@ def test_every_effect_of_the_documentation_is_taken(checks):
         assert checks('effects', entries), entries
 
 
-def test_every_effect_has_its_own_part(weld_twin):
+def test_every_effect_has_its_own_part():
     made = json.loads(weld_twin('export', 'schema', 'effects').out)
     assert {part['title'] for part in made['items']['oneOf']} == set(REGISTRY)
 
 
-def test_a_robot_file_has_the_keys_that_its_reader_knows(weld_twin):
+def test_a_robot_file_has_the_keys_that_its_reader_knows():
     made = json.loads(weld_twin('export', 'schema', 'robot').out)
     for data, keys in (
         ({'joints': [], 'zzz': 1}, made['properties']),
@@ -147,7 +148,6 @@ def test_a_robot_file_has_the_keys_that_its_reader_knows(weld_twin):
         assert set(known.split(', ')) == set(keys)
 
 
-def test_a_kind_that_is_not_there_is_one_sentence(weld_twin):
-    result = weld_twin('export', 'schema', 'weather')
-    assert result.code == 2
-    assert "there is no schema 'weather'; there are robot, effects, seam" in result.err
+def test_a_kind_that_is_not_there_is_one_sentence():
+    result = refused('export', 'schema', 'weather')
+    assert "there is no schema 'weather'; there are robot, effects, seam" in result

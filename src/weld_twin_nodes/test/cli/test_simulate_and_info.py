@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import done, refused, weld_twin
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
@@ -29,15 +30,10 @@ def effects(tmp_path):
     return file
 
 
-def test_without_effects_the_deviation_vanishes(weld_twin, tmp_path):
+def test_without_effects_the_deviation_vanishes(tmp_path):
     """The paper's baseline scenario: line, constant speed, no error."""
     out = tmp_path / 'bag'
-    assert (
-        weld_twin(
-            'simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'constant', '--out', out
-        ).code
-        == 0
-    )
+    done('simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'constant', '--out', out)
     last = from_messages.metrics(rows(out, '/deviation/metrics')[-1])
     assert last['D_norm'] < 1e-12
     assert last['samples'] > 1000
@@ -45,17 +41,14 @@ def test_without_effects_the_deviation_vanishes(weld_twin, tmp_path):
 
 
 @pytest.mark.parametrize('profile', ['smooth', 'aggressive'])
-def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
-    weld_twin, tmp_path, effects, profile
-):
+def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(tmp_path, effects, profile):
     out = tmp_path / 'bag'
-    result = weld_twin(
+    result = done(
         *('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40, '--path', 'weave'),
         *('--profile', profile, '--out', out),
     )
-    assert result.code == 0, result.err
     recording = read_recording(out, ROBOT)
-    assert ('slowed down' in result.out) == (profile == 'aggressive')
+    assert ('slowed down' in result) == (profile == 'aggressive')
     turned = recording.joints.q + [0, 0, 5e-4, 0, 0, 0]
     np.testing.assert_allclose(
         recording.measured.position, forward(ROBOT, turned)[:, :3, 3], rtol=0.0, atol=1e-12
@@ -67,7 +60,7 @@ def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
     )
 
 
-def test_a_model_that_knows_the_effects_leaves_no_deviation(weld_twin, tmp_path, effects):
+def test_a_model_that_knows_the_effects_leaves_no_deviation(tmp_path, effects):
     out = tmp_path / 'bag'
     weld_twin(
         *('simulate', '--robot', 'ur5', '--effects', effects, '--model', effects),
@@ -76,48 +69,45 @@ def test_a_model_that_knows_the_effects_leaves_no_deviation(weld_twin, tmp_path,
     assert from_messages.metrics(rows(out, '/deviation/metrics')[-1])['max'] < 1e-12
 
 
-def test_the_same_command_writes_the_same_messages(weld_twin, tmp_path, effects):
+def test_the_same_command_writes_the_same_messages(tmp_path, effects):
     effects.write_text('[{effect: measurement_noise, sigma: 1e-5}]')
     words = ('simulate', '--robot', 'ur5', '--effects', effects, '--profile', 'aggressive')
     for name, seed in (('a', 1), ('b', 1), ('c', 2)):
-        assert weld_twin(*words, '--seed', seed, '--out', tmp_path / name).code == 0
+        done(*words, '--seed', seed, '--out', tmp_path / name)
     a, b, c = (read_recording(tmp_path / name, ROBOT).measured.position for name in 'abc')
     np.testing.assert_array_equal(a, b)
     assert abs(a - c).max() > 1e-6
     assert provenance(tmp_path / 'a')['seed'] == 1
 
 
-def test_a_path_file_with_torch_angles_is_followed(weld_twin, tmp_path):
+def test_a_path_file_with_torch_angles_is_followed(tmp_path):
     file, out = tmp_path / 'seam.yaml', tmp_path / 'bag'
     file.write_text(
         'kind: line\nstart: [0.4, -0.1, 0.1]\nend: [0.4, 0.1, 0.1]\n'
         'torch: {travel: 0.2, work: -0.1}\n'
     )
-    result = weld_twin(
-        'simulate', '--robot', 'ur5', '--path', file, '--speed', 0.05, '--rate', 50, '--out', out
-    )
-    assert result.code == 0, result.err
+    done('simulate', '--robot', 'ur5', '--path', file, '--speed', 0.05, '--rate', 50, '--out', out)
     position = read_recording(out, ROBOT).measured.position
     np.testing.assert_allclose(position[0], [0.4, -0.1, 0.1], atol=1e-8)
     np.testing.assert_allclose(position[-1], [0.4, 0.1, 0.1], atol=1e-8)
 
 
-def test_taught_points_from_a_table_are_visited(weld_twin, tmp_path):
+def test_taught_points_from_a_table_are_visited(tmp_path):
     file, out = tmp_path / 'points.csv', tmp_path / 'bag'
     points = np.array([[0.4, -0.1, 0.1], [0.42, 0.0, 0.11], [0.4, 0.1, 0.1]])
     np.savetxt(file, points, delimiter=',', header='x,y,z', comments='')
-    assert weld_twin('simulate', '--robot', 'ur5', '--path', file, '--out', out).code == 0
+    done('simulate', '--robot', 'ur5', '--path', file, '--out', out)
     position = read_recording(out, ROBOT).measured.position
     for point in points:
         assert np.linalg.norm(position - point, axis=1).min() < 3e-4
 
 
-def test_info_lists_the_bundled_robots(weld_twin):
+def test_info_lists_the_bundled_robots():
     listed = weld_twin('bag', '--robots').out
     assert all(name in listed for name in catalog.names())
 
 
-def test_a_bag_that_was_cut_short_is_named(weld_twin, tmp_path):
+def test_a_bag_that_was_cut_short_is_named(tmp_path):
     out = tmp_path / 'bag'
     weld_twin('simulate', '--robot', 'ur5', '--profile', 'aggressive', '--out', out)
     file = out / 'bag.mcap'
@@ -147,7 +137,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('what', BAD)
-def test_bad_input_costs_one_line_and_leaves_nothing(weld_twin, tmp_path, what):
+def test_bad_input_costs_one_line_and_leaves_nothing(tmp_path, what):
     words, sentence = BAD[what]
     if words[0] in ('--effects', '--path'):
         file = tmp_path / 'input.yaml'
@@ -155,28 +145,21 @@ def test_bad_input_costs_one_line_and_leaves_nothing(weld_twin, tmp_path, what):
             file.write_text(words[1])
         words = (words[0], file)
     before = set(tmp_path.iterdir())
-    result = weld_twin('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
-    assert result.code == 2
-    assert result.out == ''
-    assert len(result.err.splitlines()) == 1
-    assert sentence in result.err
+    assert sentence in refused('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag', *words)
     assert set(tmp_path.iterdir()) == before
 
 
-def test_an_existing_bag_is_not_overwritten(weld_twin, tmp_path):
+def test_an_existing_bag_is_not_overwritten(tmp_path):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'precious').touch()
-    result = weld_twin('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag')
-    assert result.code == 2
-    assert 'exists already' in result.err
+    assert 'exists already' in refused('simulate', '--robot', 'ur5', '--out', tmp_path / 'bag')
     assert (tmp_path / 'bag' / 'precious').exists()
 
 
 @pytest.mark.parametrize('words', [(), ('dance',), ('simulate',), ('bag',), ('bag', 'info')])
-def test_wrong_usage_exits_with_2(weld_twin, words):
-    result = weld_twin(*words)
-    assert result.code == 2
-    assert result.err
+def test_wrong_usage_exits_with_2(words):
+    result = refused(*words)
+    assert result
 
 
 def test_help_is_quick_because_it_imports_little():
@@ -193,7 +176,7 @@ def test_help_is_quick_because_it_imports_little():
     subprocess.run([sys.executable, '-c', code], check=True, capture_output=True)
 
 
-def simulated_with(weld_twin, folder, effect, *more):
+def simulated_with(folder, effect, *more):
     """Return what the command says of a short motion with one effect."""
     (folder / 'e.yaml').write_text(f'- {effect}\n')
     words = ('--effects', folder / 'e.yaml', '--rate', 20, '--out', folder / 'bag', *more)
@@ -219,24 +202,24 @@ def simulated_with(weld_twin, folder, effect, *more):
         ),
     ],
 )
-def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(weld_twin, tmp_path, effect, said):
-    result = simulated_with(weld_twin, tmp_path, effect)
+def test_a_value_that_no_machine_has_is_doubted_in_a_sentence(tmp_path, effect, said):
+    result = simulated_with(tmp_path, effect)
     assert result.code == 0
     assert said in result.err
 
 
-def test_a_value_that_no_machine_comes_near_is_refused_unless_it_is_meant(weld_twin, tmp_path):
+def test_a_value_that_no_machine_comes_near_is_refused_unless_it_is_meant(tmp_path):
     effect = '{effect: joint_offset, joint: elbow_joint, offset: 5}'
-    result = simulated_with(weld_twin, tmp_path, effect)
+    result = simulated_with(tmp_path, effect)
     assert result.code == 2
     assert "e.yaml': offset of joint_offset of elbow_joint is 5; no machine" in result.err
     assert not (tmp_path / 'bag').exists()
-    assert simulated_with(weld_twin, tmp_path, effect, '--allow-implausible').code == 0
+    assert simulated_with(tmp_path, effect, '--allow-implausible').code == 0
 
 
-def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_path):
+def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(tmp_path):
     effect = '{effect: time_delay, delay: 200}'
-    result = simulated_with(weld_twin, tmp_path, effect, '--allow-implausible')
+    result = simulated_with(tmp_path, effect, '--allow-implausible')
     assert result.code == 2
     assert 'no measurement meets a pose of the twin' in result.err
     assert not (tmp_path / 'bag').exists()
@@ -255,12 +238,11 @@ def cell7(tmp_path, monkeypatch):
     return file
 
 
-def test_commands_take_it_and_info_lists_it(weld_twin, cell7, tmp_path):
+def test_commands_take_it_and_info_lists_it(cell7, tmp_path):
     heights = {}
     for robot in ('cell7', 'kuka_kr16_2'):
         words = ('--robot', robot, '--path', 'line', '--rate', 20, '--out', tmp_path / robot)
-        said = weld_twin('simulate', *words)
-        assert said.code == 0, said.err
+        done('simulate', *words)
         bag = read_recording(tmp_path / robot, load_robot(robot))
         heights[robot] = bag.measured.position[:, 2].mean()
     assert heights['cell7'] - heights['kuka_kr16_2'] == pytest.approx(0.75, abs=1e-9)

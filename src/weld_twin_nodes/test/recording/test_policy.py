@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from defusedxml.ElementTree import parse
 
+from weld_twin_nodes.cli.in_process import weld_twin
+
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_core.errors import DataError
@@ -109,13 +111,13 @@ def test_the_policy_speaks_of_the_nodes_there_are_and_denies_nothing_by_name():
             assert not any('*' in item.text for item in block)
 
 
-def test_the_file_is_what_the_command_prints(weld_twin):
+def test_the_file_is_what_the_command_prints():
     code, printed, _ = weld_twin('export', 'policy')
     assert code == 0
     assert printed == POLICY.read_text(encoding='utf-8')
 
 
-def test_a_namespace_and_remaps_change_the_names_they_mean(tmp_path, weld_twin):
+def test_a_namespace_and_remaps_change_the_names_they_mean(tmp_path):
     out = tmp_path / 'left.xml'
     words = [
         'export',

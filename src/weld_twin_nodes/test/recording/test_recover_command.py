@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import done, refused, weld_twin
 
 from weld_twin_msgs_py.bags import BagReader, GrowingBag
 from weld_twin_msgs_py.messages.to_messages import bag_messages
@@ -31,7 +32,7 @@ def cut_short(request, tmp_path):
     return tmp_path / 'bag'
 
 
-def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin, monkeypatch):
+def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, monkeypatch):
     """The disk of the recording has no room left for a copy; that of the present directory has."""
     here = cut_short.parent.parent / f'elsewhere_{cut_short.parent.name}'
     here.mkdir()
@@ -43,32 +44,27 @@ def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin,
     said = weld_twin('bag', cut_short)
     printed = re.search(r"'weld-twin (bag recover .*)'", said.err)
     assert printed is not None
-    assert weld_twin(*shlex.split(printed[1])).code == 0
+    done(*shlex.split(printed[1]))
     with BagReader(here / 'bag') as bag:
         assert len(list(bag.messages([JOINT_STATES.name]))) == FLUSHED
 
 
-def test_a_recording_that_was_cut_short_and_renamed_is_found_and_recovered(cut_short, weld_twin):
+def test_a_recording_that_was_cut_short_and_renamed_is_found_and_recovered(cut_short):
     renamed = cut_short.with_name('tuesday')
     cut_short.with_name('bag.unfinished').rename(renamed)
-    said = weld_twin('bag', renamed)
-    assert said.code == 2
-    assert f"'weld-twin bag recover {renamed}'" in said.err
-    assert weld_twin('bag', 'recover', renamed).code == 0
+    assert f"'weld-twin bag recover {renamed}'" in refused('bag', renamed)
+    done('bag', 'recover', renamed)
     with BagReader(cut_short.with_name('tuesday_recovered')) as bag:
         assert len(list(bag.messages([JOINT_STATES.name]))) == FLUSHED
 
 
-def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, weld_twin):
+def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short):
     there = cut_short.parent / 'there'
-    said = weld_twin('bag', 'recover', cut_short, '--out', there)
-    assert said.code == 0
+    said = done('bag', 'recover', cut_short, '--out', there)
     with BagReader(there) as bag:
         count = len(list(bag.messages([JOINT_STATES.name])))
     assert count == FLUSHED
-    assert f'{count}  /joint_states' in said.out
-    assert 'the original stays' in said.out
+    assert f'{count}  /joint_states' in said
+    assert 'the original stays' in said
     assert not cut_short.exists()
-    again = weld_twin('bag', 'recover', cut_short, '--out', there)
-    assert again.code == 2
-    assert 'is not overwritten' in again.err
+    assert 'is not overwritten' in refused('bag', 'recover', cut_short, '--out', there)

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.effects import REGISTRY
 from weld_twin_msgs_py.bags.writer import BagWriter
 from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_nodes.cli.in_process import weld_twin
 
 # theta offset, d, a, alpha of an arm that nobody sells
 ROWS = np.array(
@@ -80,7 +81,7 @@ def board_bag(path, kind, q, poses, covariance):
             bag.write('/measured/tool_pose', seen, ns)
 
 
-def test_a_board_counts_less_along_the_line_of_sight(tmp_path, weld_twin):
+def test_a_board_counts_less_along_the_line_of_sight(tmp_path):
     rng = np.random.default_rng(8)
     q = rng.uniform(-0.7, 0.7, (40, 6))
     zeros = np.array([0.0, 0.0, 6e-4, 0.0, 0.0, 0.0])
@@ -193,7 +194,7 @@ def described(folder):
     ]
 
 
-def diagnosed(folder, robot, weld_twin):
+def diagnosed(folder, robot):
     """Return what `import` says of the pixels, and the diagnosis."""
     said = weld_twin(
         'import',
@@ -211,9 +212,9 @@ def diagnosed(folder, robot, weld_twin):
     return said, json.loads((folder / 'out' / 'diagnosis.json').read_text())
 
 
-def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_twin):
+def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path):
     robot = cell(tmp_path, zeros=np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]))
-    said, found = diagnosed(tmp_path, robot, weld_twin)
+    said, found = diagnosed(tmp_path, robot)
     assert '40 of 40 images tell a pose; points are found within 0.1' in said
     named = [(e['effect'], e['joint']) for e in found['verdict']['effects']]
     assert named == [('joint_offset', 'axis_3')]
@@ -221,7 +222,7 @@ def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_t
     assert (tmp_path / 'out' / 'report.html').is_file()
 
 
-def test_mistakes_with_cameras_are_named_from_a_table_of_pixels_alone(tmp_path, weld_twin):
+def test_mistakes_with_cameras_are_named_from_a_table_of_pixels_alone(tmp_path):
     zeros = np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])
     for kind, mistake in (
         ('target_scale', {'side': 0.98 * 0.025}),
@@ -275,7 +276,7 @@ def grips(rng, zeros, count):
     return np.hstack([left, right])[held][:count]
 
 
-def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path, weld_twin):
+def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path):
     rng, zeros = np.random.default_rng(6), np.zeros(6)
     zeros[2] = OFF
     q = grips(rng, zeros, 40) + rng.normal(0.0, 1.5e-5, (40, 12))

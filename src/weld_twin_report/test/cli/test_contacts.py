@@ -13,6 +13,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.motion.inverse.newton import reaching
 from weld_twin_msgs_py.robots import load_robot, write_urdf
+from weld_twin_nodes.cli.in_process import weld_twin
 
 PLACES = {
     'low a': [0.45, 0.1, 0.2],
@@ -46,7 +47,7 @@ def cell(tmp_path_factory):
     return folder
 
 
-def test_touches_become_a_corrected_urdf(cell, weld_twin):
+def test_touches_become_a_corrected_urdf(cell):
     urdf = ('--robot', str(cell / 'cell.urdf'))
     artefact = ('--contacts', str(cell / 'artefact.yaml'))
     bag, out = str(cell / 'bag'), cell / 'out'

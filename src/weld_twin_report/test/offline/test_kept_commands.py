@@ -23,6 +23,7 @@ from weld_twin_core.twin.directions import Directions
 from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict
+from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = load('ur5')
 NAMES = list(ROBOT.joint_names)
@@ -100,7 +101,7 @@ def content(file):
     return text
 
 
-def test_commands_say_and_write_what_was_kept(place, weld_twin, kept, monkeypatch):
+def test_commands_say_and_write_what_was_kept(place, kept, monkeypatch):
     monkeypatch.chdir(place)
     there = set(place.rglob('*'))
     for name, words in COMMANDS.items():

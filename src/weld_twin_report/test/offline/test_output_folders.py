@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import done, refused
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -49,9 +50,9 @@ def program(tmp_path):
     return path
 
 
-def correct(weld_twin, program, out, *more):
+def correct(program, out, *more, run=done):
     """Write a program back: the quickest command that writes a folder."""
-    return weld_twin('correct', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
+    return run('correct', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
 
 
 def kept_history(path):
@@ -68,18 +69,17 @@ def kept_history(path):
     return path
 
 
-def test_a_web_site_is_not_taken_for_pages_of_a_fleet(weld_twin, tmp_path):
+def test_a_web_site_is_not_taken_for_pages_of_a_fleet(tmp_path):
     pytest.importorskip('sqlalchemy', reason='the history is an extra')
     site, history = tmp_path / 'site', kept_history(tmp_path / 'fleet.db')
     site.mkdir()
     (site / 'index.html').write_text('<h1>Welders of Ghent</h1>')
     (site / 'style.css').write_text('h1 {}')
     before = content(site)
-    refused = weld_twin('history', 'page', '--db', history, '--out', site)
-    assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
+    said = refused('history', 'page', '--db', history, '--out', site)
+    assert 'no list says that weld-twin wrote it' in said
     assert content(site) == before
-    forced = weld_twin('history', 'page', '--db', history, '--out', site, '--force')
-    assert forced.code == 0, forced.err
+    done('history', 'page', '--db', history, '--out', site, '--force')
     assert (site / 'index.kept-1.html').read_text() == before['index.html'].decode()
     assert (site / 'style.css').read_bytes() == before['style.css']
 
@@ -97,29 +97,29 @@ def test_a_second_run_replaces_what_is_ours_and_removes_what_is_not_made_again(t
 
 
 def test_a_folder_of_an_earlier_version_has_no_list_so_nothing_in_it_is_replaced(
-    weld_twin, program, tmp_path
+    program, tmp_path
 ):
     out = tmp_path / 'better'
-    assert correct(weld_twin, program, out).code == 0
+    correct(program, out)
     (out / LIST).unlink()
     (out / 'bracket.src').write_text('; my own\n')
-    refused = correct(weld_twin, program, out)
-    assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
-    assert "--force, which keeps it as 'correction.kept-1.json'" in refused.err
-    assert correct(weld_twin, program, out, '--force').code == 0
+    said = correct(program, out, run=refused)
+    assert 'no list says that weld-twin wrote it' in said.err
+    assert "--force, which keeps it as 'correction.kept-1.json'" in said.err
+    correct(program, out, '--force')
     assert (out / 'bracket.kept-1.src').read_text() == '; my own\n'
     assert not (out / 'correction.kept-1.json').exists()  # it is the same as before
     assert (out / 'bracket.src').read_bytes() == program.read_bytes()
 
 
 @pytest.mark.parametrize('damage', ['', '{', '[]', '{"schema": "weld_twin/files/9"}', '{"results'])
-def test_with_a_damaged_list_nothing_is_ours(tmp_path, weld_twin, program, damage):
+def test_with_a_damaged_list_nothing_is_ours(tmp_path, program, damage):
     out = tmp_path / 'better'
-    assert correct(weld_twin, program, out).code == 0
+    correct(program, out)
     (out / LIST).write_text(damage)
     (out / 'bracket.src').write_text('; my own\n')
-    refused = correct(weld_twin, program, out)
-    assert refused.code == 2 and 'no list says' in refused.err
+    said = correct(program, out, run=refused)
+    assert 'no list says' in said.err
     assert (out / 'bracket.src').read_text() == '; my own\n'
 
 
@@ -134,48 +134,48 @@ def test_a_list_of_more_than_50_megabytes_is_none(tmp_path, size, ours):
     assert (out / 'a.txt').read_text() == ('2' if ours else '1')
 
 
-def test_links_are_followed_and_never_replaced(weld_twin, program, tmp_path):
+def test_links_are_followed_and_never_replaced(program, tmp_path):
     real, link, ahead = tmp_path / 'disk/here', tmp_path / 'better', tmp_path / 'later'
     real.mkdir(parents=True)
     (real / 'notes.txt').write_text('mine')
     link.symlink_to(real)
     ahead.symlink_to(tmp_path / 'disk/there')
-    assert correct(weld_twin, program, link, '--force').code == 0
-    assert correct(weld_twin, program, ahead).code == 0
+    correct(program, link, '--force')
+    correct(program, ahead)
     assert link.is_symlink() and ahead.is_symlink()
     assert set(content(real)) == {'notes.txt', 'bracket.src', 'correction.json'}
     assert set(content(tmp_path / 'disk/there')) == {'bracket.src', 'correction.json'}
     # A link inside is a person's, too.
     (real / 'bracket.src').rename(tmp_path / 'controller.src')
     (real / 'bracket.src').symlink_to(tmp_path / 'controller.src')
-    assert correct(weld_twin, program, link).code == 2
-    assert correct(weld_twin, program, link, '--force').code == 0
+    correct(program, link, run=refused)
+    correct(program, link, '--force')
     assert (real / 'bracket.kept-1.src').is_symlink()
     assert (tmp_path / 'controller.src').read_bytes() == program.read_bytes()
 
 
-def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
+def test_a_bag_and_a_file_go_where_a_link_leads(tmp_path):
     for name in ('bag', 'schema.json'):
         (tmp_path / name).symlink_to(tmp_path / f'disk/{name}')
     words = ('simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'smooth', '--rate', 10)
-    assert weld_twin(*words, '--out', tmp_path / 'bag').code == 0
-    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'schema.json').code == 0
+    done(*words, '--out', tmp_path / 'bag')
+    done('export', 'schema', 'robot', '--out', tmp_path / 'schema.json')
     assert (tmp_path / 'bag').is_symlink() and (tmp_path / 'schema.json').is_symlink()
     assert (tmp_path / 'disk/bag/metadata.yaml').is_file()
     assert json.loads((tmp_path / 'disk/schema.json').read_text())
     before = content(tmp_path / 'disk')
-    assert weld_twin(*words, '--out', tmp_path / 'bag').code == 2
+    refused(*words, '--out', tmp_path / 'bag')
     (tmp_path / 'disk/schema.json').write_text('changed')
     before['schema.json'] = b'changed'
-    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'schema.json').code == 2
+    refused('export', 'schema', 'robot', '--out', tmp_path / 'schema.json')
     assert content(tmp_path / 'disk') == before
 
 
-def test_a_prediction_whose_table_is_in_the_way_leaves_no_bag(weld_twin, tmp_path):
+def test_a_prediction_whose_table_is_in_the_way_leaves_no_bag(tmp_path):
     bag, table = Path(__file__).parents[4] / 'bags/elbow_play', tmp_path / 'poses.csv'
     table.write_text('mine')
     words = ('simulate', bag, '--robot', 'ur5', '--model', f'{bag}.yaml', '--table', table)
-    assert weld_twin(*words, '--out', tmp_path / 'predicted').code == 2
+    refused(*words, '--out', tmp_path / 'predicted')
     assert content(tmp_path) == {'poses.csv': b'mine'}
 
 
@@ -210,15 +210,13 @@ def test_what_a_person_saves_while_the_command_runs_is_not_lost(tmp_path, capsys
     assert capsys.readouterr().err == said
 
 
-def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(
-    weld_twin, program, tmp_path
-):
+def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(program, tmp_path):
     (tmp_path / 'thesis.tex').write_text('years of work')
-    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'robot.json').code == 0
-    refused = correct(weld_twin, program, tmp_path)
-    assert refused.code == 2 and 'holds something else already' in refused.err
-    assert correct(weld_twin, program, tmp_path, '--force').code == 0
-    assert correct(weld_twin, program, tmp_path).code == 0
+    done('export', 'schema', 'robot', '--out', tmp_path / 'robot.json')
+    said = correct(program, tmp_path, run=refused)
+    assert 'holds something else already' in said.err
+    correct(program, tmp_path, '--force')
+    correct(program, tmp_path)
     assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
 
 
@@ -235,11 +233,11 @@ def test_two_runs_at_once_into_one_folder_leave_the_whole_result_of_the_last(tmp
     assert {path.name for path in tmp_path.iterdir()} == {'new', 'there'}
 
 
-def test_two_results_in_one_folder_do_not_take_each_others_files(weld_twin, program, tmp_path):
+def test_two_results_in_one_folder_do_not_take_each_others_files(program, tmp_path):
     out = tmp_path / 'monday'
-    assert correct(weld_twin, program, out).code == 0
+    correct(program, out)
     make(out, **{'more.txt': '1'})
-    assert correct(weld_twin, program, out).code == 0
+    correct(program, out)
     assert set(content(out)) == {'bracket.src', 'correction.json', 'result.json', 'more.txt'}
     write_owned(out / 'more.txt', 'of a third')
     assert (out / 'more.kept-1.txt').read_text() == '1'
@@ -357,11 +355,11 @@ def test_a_text_whose_writer_was_killed_leaves_nothing_beside_it(tmp_path):
     assert content(tmp_path) == {'a.json': b'whole'}
 
 
-def test_a_folder_that_cannot_be_written_is_a_sentence(weld_twin, program, tmp_path):
+def test_a_folder_that_cannot_be_written_is_a_sentence(program, tmp_path):
     (tmp_path / 'file').write_text('mine')
     for out in (tmp_path / 'file', tmp_path / 'file/below'):
-        refused = correct(weld_twin, program, out)
-        assert refused.code == 2 and refused.err.count('\n') == 1
+        said = correct(program, out)
+        assert said.code == 2
     assert (tmp_path / 'file').read_text() == 'mine'
 
 

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 import yaml
+from command_line import done, refused
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -73,19 +74,18 @@ def diagnosed(tmp_path_factory):
     return folder / 'found/diagnosis.json'
 
 
-def test_stations_without_measurements_are_predicted_as_stations(weld_twin, tmp_path, diagnosed):
+def test_stations_without_measurements_are_predicted_as_stations(tmp_path, diagnosed):
     q = CENTRE + 0.8 * HALF * RNG.uniform(-1.0, 1.0, (20, 6))
-    result = weld_twin('simulate', bag(tmp_path / 'asked', q), '--robot', ARM.name,
+    result = done('simulate', bag(tmp_path / 'asked', q), '--robot', ARM.name,
                        '--model', diagnosed, '--out', tmp_path / 'told')  # fmt: skip
-    assert result.code == 0, result.err
-    sigma = float(re.search(r'within ([\d.e-]+) mm', result.out)[1])
-    assert sigma < 0.15 and 'moves at up to' not in result.out
+    sigma = float(re.search(r'within ([\d.e-]+) mm', result)[1])
+    assert sigma < 0.15 and 'moves at up to' not in result
     assert json.loads((tmp_path / 'told/prediction.json').read_text()) == {'outside': []}
     assert np.linalg.norm(predicted(tmp_path / 'told') - real_points(q), axis=1).max() < 1.5e-4
 
 
 @pytest.mark.parametrize('seen', [(), (0, 1, 2, 4, 5, 7, 8, 9)])
-def test_a_delay_and_a_lag_do_nothing_at_rest(weld_twin, tmp_path, seen):
+def test_a_delay_and_a_lag_do_nothing_at_rest(tmp_path, seen):
     effects = [
         {'effect': 'time_delay', 'delay': 0.02},
         {'effect': 'servo_lag', 'joint': ARM.joint_names[0], 'time_constant': 0.02},
@@ -93,21 +93,19 @@ def test_a_delay_and_a_lag_do_nothing_at_rest(weld_twin, tmp_path, seen):
     ]
     (tmp_path / 'effects.yaml').write_text(yaml.safe_dump(effects))
     asked = bag(tmp_path / 'asked', Q[:10], set(seen))
-    result = weld_twin('simulate', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml',
+    done('simulate', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml',
                        '--out', tmp_path / 'told')  # fmt: skip
-    assert result.code == 0, result.err
     np.testing.assert_allclose(predicted(tmp_path / 'told'), real_points(Q[:10]), atol=1e-9)
 
 
-def test_a_temperature_that_the_bag_lacks_is_said(weld_twin, tmp_path):
+def test_a_temperature_that_the_bag_lacks_is_said(tmp_path):
     """All links grow by 12 ppm/K: with the base at the origin, 10 K move the tool by 120 ppm."""
     effects = [{'effect': 'thermal_growth', 'coefficient': 12e-6, 'reference': 20.0}]
     (tmp_path / 'effects.yaml').write_text(yaml.safe_dump(effects))
     asked = bag(tmp_path / 'asked', Q[:6])
     words = ('simulate', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml', '--out')
-    cold = weld_twin(*words, tmp_path / 'cold')
-    assert cold.code == 2 and 'say it with --temperature' in cold.err
-    assert weld_twin(*words, tmp_path / 'warm', '--temperature', 30).code == 0
+    assert 'say it with --temperature' in refused(*words, tmp_path / 'cold')
+    done(*words, tmp_path / 'warm', '--temperature', 30)
     flange = forward(ARM.with_frames(tool=np.eye(4)), Q[:6])[:, :3, 3]
     moved = predicted(tmp_path / 'warm') - forward(ARM, Q[:6])[:, :3, 3]
     np.testing.assert_allclose(moved, 1.2e-4 * flange, atol=2e-6)

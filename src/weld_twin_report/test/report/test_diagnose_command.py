@@ -9,6 +9,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from command_line import done, refused
 from scipy.stats import chi2
 
 from weld_twin_core.arm.catalog import load
@@ -129,18 +130,16 @@ def test_what_is_known_is_in_the_twin_from_the_start_and_what_is_excluded_never_
         (['--pose-topic', '/camera'], "no message on '/camera'"),
     ],
 )
-def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, capsys, words, reason):
+def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, words, reason):
     out = tmp_path / 'd'
-    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--out', out, *words) == 2
-    err = capsys.readouterr().err
-    assert reason in err and err.count('\n') == 1
+    assert reason in refused('diagnose', cell / 'first', '--robot', 'ur5', '--out', out, *words)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_directory_of_something_else_is_not_replaced(cell, tmp_path, capsys):
+def test_a_directory_of_something_else_is_not_replaced(cell, tmp_path):
     (tmp_path / 'thesis.tex').write_text('years of work')
-    assert run('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path) == 2
-    assert 'holds something else' in capsys.readouterr().err
+    said = refused('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path)
+    assert 'holds something else' in said
     assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
 
 
@@ -159,7 +158,7 @@ def twin_poses(bag):
 def test_predict_adds_what_was_found_at_every_joint_state(cell, found, tmp_path):
     model = found / 'diagnosis.json'
     out = tmp_path / 'predicted'
-    assert run('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    done('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out)
     ns, position = twin_poses(out)
     recording = read_recording(cell / 'second', load('ur5'))
     assert np.array_equal(ns - recording.epoch_ns, np.round(recording.joints.t * 1e9))
@@ -197,7 +196,7 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
         tmp_path / 'm.json', robot, [{'effect': 'time_delay', 'delay': DELAY}], [base], tool
     )
     out = tmp_path / 'p'
-    assert run('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    done('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out)
     _, position = twin_poses(out)
     motion = read_recording(cell / 'first', robot).joints
     nominal = Twin(robot.with_frames(tool=tool))
@@ -209,7 +208,7 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
     )
 
 
-def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path, capsys):
+def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path):
     bases = [np.eye(4), np.eye(4)]
     bases[1][0, 3] = 1.0
     hashes = []
@@ -221,10 +220,9 @@ def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path, capsy
     own = write_model(tmp_path / 'own.json', load('ur5'), [], bases, inputs=hashes)
     other = write_model(tmp_path / 'other.json', load('ur5'), [], bases, inputs=hashes[:1])
     predict = ('simulate', cell / 'second', '--robot', 'ur5')
-    assert run(*predict, '--model', own, '--out', tmp_path / 'a') == 0
-    assert run(*predict, '--model', other, '--out', tmp_path / 'b') == 2
-    assert '--setup 1 to 2' in capsys.readouterr().err
-    assert run(*predict, '--model', other, '--setup', 1, '--out', tmp_path / 'c') == 0
+    done(*predict, '--model', own, '--out', tmp_path / 'a')
+    assert '--setup 1 to 2' in refused(*predict, '--model', other, '--out', tmp_path / 'b')
+    done(*predict, '--model', other, '--setup', 1, '--out', tmp_path / 'c')
     apart = twin_poses(tmp_path / 'a')[1] - twin_poses(tmp_path / 'c')[1]
     assert apart == pytest.approx(np.tile([1.0, 0.0, 0.0], (len(apart), 1)))
 
@@ -246,12 +244,9 @@ def test_exports_carry_the_correction_and_leave_the_rest_as_effects(offset_model
         ('left-over', 'l.yaml'),
         ('effects', 'e.yaml'),
     ):
-        assert (
-            run(
-                *('export', offset_model, '--robot', 'ur5', '--format', form),
-                *('--out', tmp_path / name),
-            )
-            == 0
+        done(
+            *('export', offset_model, '--robot', 'ur5', '--format', form),
+            *('--out', tmp_path / name),
         )
     q = np.array([[0.1, -1.0, 1.2, 0.3, -0.5, 0.2]])
     shifted = q + OFFSET * np.eye(6)[2]
@@ -270,7 +265,7 @@ def _at(q):
     return JointMotion(np.zeros(1), q)
 
 
-def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, capsys):
+def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path):
     model = write_model(
         tmp_path / 'm.json',
         load('ur5'),
@@ -278,12 +273,12 @@ def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, c
         [np.eye(4)],
     )
     out = tmp_path / 'commands'
-    assert run('correct', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    said = done('correct', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out)
     nominal = read_recording(cell / 'first', load('ur5')).joints
     commands = read_recording(out, load('ur5')).joints
     assert np.abs(commands.q - (nominal.q - OFFSET * np.eye(6)[2])).max() < 1e-9
     assert provenance(out)['compensated_with'][0]['effect'] == 'joint_offset'
-    assert 'and 0.0000 mm with these' in capsys.readouterr().out
+    assert 'and 0.0000 mm with these' in said
 
 
 @pytest.mark.parametrize(
@@ -300,20 +295,17 @@ def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, c
         ('{"schema": "weld_twin/diagnosis/1", "model": {"bases": []}}', "lacks 'tool'"),
     ],
 )
-def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, capsys, content, reason):
+def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, content, reason):
     path = tmp_path / 'm.json'
     path.write_text(content)
-    assert run('export', path, '--robot', 'ur5') == 2
-    err = capsys.readouterr().err
-    assert reason in err and err.count('\n') == 1
+    assert reason in refused('export', path, '--robot', 'ur5')
 
 
 @pytest.mark.parametrize(('size', 'reason'), [(60e6, 'is not JSON'), (65e6, 'larger than any')])
-def test_a_diagnosis_has_at_most_64_megabytes(tmp_path, capsys, size, reason):
+def test_a_diagnosis_has_at_most_64_megabytes(tmp_path, size, reason):
     with open(tmp_path / 'm.json', 'wb') as file:
         file.truncate(int(size))
-    assert run('export', tmp_path / 'm.json', '--robot', 'ur5') == 2
-    assert reason in capsys.readouterr().err
+    assert reason in refused('export', tmp_path / 'm.json', '--robot', 'ur5')
 
 
 def covariances(bag):
@@ -332,11 +324,11 @@ def covariances(bag):
     return np.array([ns for ns, _, _ in rows]), positions, np.array([c for _, _, c in rows])
 
 
-def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys):
+def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path):
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
-    assert 'within' in capsys.readouterr().out
+    said = done('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out)
+    assert 'within' in said
     ns, position = twin_poses(out)
     sure_ns, sure_position, covariance = covariances(out)
     assert np.array_equal(ns, sure_ns)
@@ -356,7 +348,7 @@ def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys
 def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tmp_path):
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    done('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out)
     covariance = covariances(out)[2][:, :3, :3]
     assert np.sqrt(np.linalg.eigvalsh(covariance)[:, -1]).max() < 1e-4
     assert json.loads((out / 'prediction.json').read_text()) == {'outside': []}
@@ -365,7 +357,7 @@ def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tm
 def test_the_table_of_a_prediction_has_columns_for_sigma(cell, found, tmp_path):
     model, table = found / 'diagnosis.json', tmp_path / 'poses.csv'
     words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'p', '--table', table)
-    assert run('simulate', cell / 'second', *words) == 0
+    done('simulate', cell / 'second', *words)
     rows = list(csv.DictReader(table.open()))
     _, position, covariance = covariances(tmp_path / 'p')
     got = np.array([[float(row[f'{axis}_m']) for axis in 'xyz'] for row in rows])
@@ -385,7 +377,7 @@ def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, foun
     write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('simulate', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    done('simulate', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out)
     outside = json.loads((out / 'prediction.json').read_text())['outside']
     mine = [item for item in outside if 'beyond' in item['why']]
     assert [item['why'] for item in mine] == ['wrist_1_joint is 0.96 rad beyond what was recorded']
@@ -399,16 +391,13 @@ def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, foun
         assert off @ np.linalg.solve(covariance[k][:3, :3], off) < chi2.ppf(0.999, 3)
 
 
-def test_a_model_written_without_a_posterior_still_predicts_and_says_so(
-    cell, found, tmp_path, capsys
-):
+def test_a_model_written_without_a_posterior_still_predicts_and_says_so(cell, found, tmp_path):
     data = json.loads((found / 'diagnosis.json').read_text())
     del data['posterior']
     (tmp_path / 'old.json').write_text(json.dumps(data))
     out = tmp_path / 'predicted'
     words = ('--robot', 'ur5', '--model', tmp_path / 'old.json', '--out', out)
-    assert run('simulate', cell / 'second', *words) == 0
-    assert 'has no posterior' in capsys.readouterr().out
+    assert 'has no posterior' in done('simulate', cell / 'second', *words)
     assert covariances(out)[0].size == 0
     assert not (out / 'prediction.json').exists()
 
@@ -422,18 +411,15 @@ def test_a_model_written_without_a_posterior_still_predicts_and_says_so(
         (lambda p: p['discrepancy'].update(position_m=-1.0), 'must be a size'),
     ],
 )
-def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, capsys, spoil, reason):
+def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
     data = json.loads((found / 'diagnosis.json').read_text())
     spoil(data['posterior'])
     (tmp_path / 'spoilt.json').write_text(json.dumps(data))
     words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
-    assert run('simulate', cell / 'second', *words) == 2
-    err = capsys.readouterr().err
-    assert reason in err
-    assert err.count('\n') == 1
+    assert reason in refused('simulate', cell / 'second', *words)
 
 
-def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_path, capsys):
+def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_path):
     robot = load('ur5')
     t = np.linspace(0.0, 4.0, 401)
     q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
@@ -441,9 +427,7 @@ def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_pat
     write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
     out = tmp_path / 'commands'
     words = ('--robot', 'ur5', '--model', found / 'diagnosis.json', '--out', out)
-    assert run('correct', tmp_path / 'far', *words) == 0
-    told = capsys.readouterr().out
-    assert 'outside what was recorded' in told
+    assert 'outside what was recorded' in done('correct', tmp_path / 'far', *words)
     assert (
         'wrist_1_joint' in json.loads((out / 'prediction.json').read_text())['outside'][0]['why']
     )

@@ -8,6 +8,7 @@ import diagnoses
 import pytest
 
 from weld_twin_core.errors import DataError
+from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.report import report_page
 from weld_twin_report.report.diagnosis_files import browser as program
 from weld_twin_report.report.diagnosis_files import print_page
@@ -26,9 +27,7 @@ def test_the_page_is_printed_on_two_sides_at_most(tmp_path):
     assert 1 <= len(re.findall(rb'/Type /Page\b', content)) <= 2
 
 
-def test_without_a_browser_it_is_said_before_anything_is_computed(
-    weld_twin, tmp_path, monkeypatch
-):
+def test_without_a_browser_it_is_said_before_anything_is_computed(tmp_path, monkeypatch):
     monkeypatch.setenv('PATH', str(tmp_path))
     code, _, told = weld_twin(
         'diagnose', tmp_path / 'no bag', '--robot', 'ur5', '--pdf', '--out', tmp_path / 'out'
@@ -45,9 +44,7 @@ def test_without_a_browser_it_is_said_before_anything_is_computed(
         ('--joint-names', 'no_file.yaml', 'a prefix of one to three letters such as A, or a YAML'),
     ],
 )
-def test_what_the_sheet_cannot_use_is_refused_in_a_sentence(
-    option, value, part, weld_twin, tmp_path
-):
+def test_what_the_sheet_cannot_use_is_refused_in_a_sentence(option, value, part, tmp_path):
     code, _, told = weld_twin(
         'diagnose', tmp_path / 'no bag', '--robot', 'ur5', option, value, '--out', tmp_path / 'out'
     )

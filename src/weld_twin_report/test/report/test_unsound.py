@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import done, refused
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
@@ -66,7 +67,7 @@ def bags(tmp_path_factory):
 @pytest.fixture(scope='module')
 def found(bags):
     words = ('diagnose', bags / 'sound', '--robot', 'ur5', *OTHERS)
-    assert run(*words, '--out', bags / 'found') == 0
+    done(*words, '--out', bags / 'found')
     return bags / 'found'
 
 
@@ -104,11 +105,10 @@ def test_a_mistake_is_the_whole_answer_and_leaves_no_model(unsound):
     assert 'What to do' not in page and 'What to measure next' not in page
 
 
-def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path, capsys):
+def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path):
     out = tmp_path / 'd'
     words = ('diagnose', bags / 'swapped', '--robot', 'ur5', '--apply', *OTHERS)
-    assert run(*words, '--out', out) == 0
-    assert 'mended before the diagnosis' in ' '.join(capsys.readouterr().out.split())
+    assert 'mended before the diagnosis' in ' '.join(done(*words, '--out', out).split())
     said, sound = content(out), content(found)
     assert [item['applied'] for item in said['unsound']] == [True]
     assert said['verdict']['effects'] == sound['verdict']['effects']
@@ -117,7 +117,7 @@ def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path, capsys):
         assert 'swapped' in (out / name).read_text(), name
         assert 'swapped' not in (found / name).read_text(), name
     again = tmp_path / 'exported.yaml'
-    assert run('export', out / 'diagnosis.json', '--robot', 'ur5', '--out', again) == 0
+    done('export', out / 'diagnosis.json', '--robot', 'ur5', '--out', again)
     assert 'swapped' in again.read_text()
 
 
@@ -128,7 +128,7 @@ def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_ha
     write_recording(tmp_path / 'bag', away, load('ur5'))
     out = tmp_path / 'd'
     words = ('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', *OTHERS)
-    assert run(*words, '--out', out) == 0
+    done(*words, '--out', out)
     (action,) = content(out)['verdict']['actions']
     assert 'elbow_joint stands at X + 0.11' in action
     needed = 'as it was recorded needs the opposite sign'
@@ -143,9 +143,7 @@ def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_ha
 JOINT_MOVE = 'def p():\n  movej([0.1, -1.3, 1.5, -1.8, -1.5, 0.0])\nend\n'
 
 
-def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remembered(
-    tmp_path, capsys
-):
+def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remembered(tmp_path):
     recording = measured(1)
     points, robot = recording.measured, load('ur5')
     q = recording.joints.at(points.t)[0] * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
@@ -153,9 +151,9 @@ def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remember
     head = ','.join(['time [s]', *(f'{name} [rad]' for name in robot.joint_names), 'x', 'y', 'z'])
     np.savetxt(tmp_path / 'shown.csv', rows, delimiter=',', header=head, comments='')
     words = ('import', tmp_path / 'shown.csv', '--robot', 'ur5', '--joint-signs', '1,1,-1,1,1,1')
-    assert run(*words, '--length-unit', 'm', '--out', tmp_path / 'bag') == 0
+    done(*words, '--length-unit', 'm', '--out', tmp_path / 'bag')
     out = tmp_path / 'd'
-    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', *OTHERS, '--out', out) == 0
+    done('diagnose', tmp_path / 'bag', '--robot', 'ur5', *OTHERS, '--out', out)
     (action,) = content(out)['verdict']['actions']
     assert 'elbow_joint stands at X + 0.1' in action
     for told in (action, (out / 'joint_offsets.csv').read_text()):
@@ -163,26 +161,24 @@ def test_a_table_of_a_joint_that_its_controller_counts_the_other_way_is_remember
     program = tmp_path / 'p.script'
     program.write_text(JOINT_MOVE)
     words = ('correct', program, '--robot', 'ur5', '--model', out / 'diagnosis.json')
-    capsys.readouterr()
-    assert run(*words, '--out', tmp_path / 'better') == 2
-    assert 'line 2: the controller counts elbow_joint otherwise' in capsys.readouterr().err
+    said = refused(*words, '--out', tmp_path / 'better')
+    assert 'line 2: the controller counts elbow_joint otherwise' in said
     words = ('investigate', tmp_path / 'plan', '--robot', 'ur5', '--model', out / 'diagnosis.json')
     words = (*words, '--tolerance', '0.3', '--postures', '3', '--minutes', '9')
-    assert run(*words, '--controller', 'urscript') == 2
-    assert 'the controller counts elbow_joint otherwise' in capsys.readouterr().err
-    assert run(*words) == 0
+    said = refused(*words, '--controller', 'urscript')
+    assert 'the controller counts elbow_joint otherwise' in said
+    done(*words)
 
 
 def test_a_sound_recording_says_that_nothing_is_wrong(found):
     assert content(found)['unsound'] == []
 
 
-def test_nothing_is_predicted_from_unsound_data(bags, unsound, tmp_path, capsys):
+def test_nothing_is_predicted_from_unsound_data(bags, unsound, tmp_path):
     model = unsound[0] / 'diagnosis.json'
     words = ('simulate', bags / 'sound', '--robot', 'ur5', '--model', model)
-    assert run(*words, '--out', tmp_path / 'p') == 2
-    err = capsys.readouterr().err
-    assert 'its data were unsound' in err and 'swapped' in err and err.count('\n') == 1
+    said = refused(*words, '--out', tmp_path / 'p')
+    assert 'its data were unsound' in said and 'swapped' in said
 
 
 def test_velocity_zero_beside_moving_positions_is_named_and_left_out(tmp_path):
@@ -191,23 +187,22 @@ def test_velocity_zero_beside_moving_positions_is_named_and_left_out(tmp_path):
     write_recording(tmp_path / 'bag', replace(sound, joints=zeros), load('ur5'))
     out = tmp_path / 'd'
     words = ('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', *OTHERS)
-    assert run(*words, '--out', out) == 0
+    done(*words, '--out', out)
     assert [item['kind'] for item in content(out)['unsound']] == ['zero_velocities']
     (effect,) = content(out)['verdict']['effects']
     assert (effect['effect'], effect['joint']) == ('joint_offset', 'elbow_joint')
 
 
 @pytest.mark.parametrize('command', ['simulate', 'correct', 'export'])
-def test_the_model_of_another_robot_is_refused(found, bags, tmp_path, capsys, command):
+def test_the_model_of_another_robot_is_refused(found, bags, tmp_path, command):
     model = found / 'diagnosis.json'
     words = {
         'simulate': ('simulate', bags / 'sound', '--model', model),
         'correct': ('correct', bags / 'sound', '--model', model),
         'export': ('export', model),
     }[command]
-    assert run(*words, '--robot', 'ur10', '--out', tmp_path / 'x') == 2
-    err = capsys.readouterr().err
-    assert "of the robot 'ur5', not of 'ur10'" in err and err.count('\n') == 1
+    said = refused(*words, '--robot', 'ur10', '--out', tmp_path / 'x')
+    assert "of the robot 'ur5', not of 'ur10'" in said
     assert not (tmp_path / 'x').exists()
 
 
@@ -217,8 +212,7 @@ def test_a_sibling_under_the_same_name_is_refused(found, tmp_path, capsys):
     (tmp_path / 'sibling.yaml').write_text(text)
     capsys.readouterr()
     words = ('export', found / 'diagnosis.json', '--robot', tmp_path / 'sibling.yaml')
-    assert run(*words, '--out', tmp_path / 'x') == 2
-    assert 'kinematics differ' in capsys.readouterr().err
+    assert 'kinematics differ' in refused(*words, '--out', tmp_path / 'x')
 
 
 def test_a_file_that_says_nothing_of_its_robot_is_taken_as_before(found, tmp_path):
@@ -226,14 +220,12 @@ def test_a_file_that_says_nothing_of_its_robot_is_taken_as_before(found, tmp_pat
     del said['model']['robot'], said['model']['kinematics']
     (tmp_path / 'diagnosis.json').write_text(json.dumps(said))
     words = ('export', tmp_path / 'diagnosis.json', '--robot', 'ur5')
-    assert run(*words, '--out', tmp_path / 'x') == 0
+    done(*words, '--out', tmp_path / 'x')
 
 
-def test_a_recording_is_not_held_out_from_itself_under_any_name(bags, tmp_path, capsys):
+def test_a_recording_is_not_held_out_from_itself_under_any_name(bags, tmp_path):
     words = ('diagnose', bags / 'sound', '--robot', 'ur5', '--out', tmp_path / 'd')
-    assert run(*words, '--holdout', bags / 'copy') == 2
-    err = capsys.readouterr().err
-    assert 'in common with' in err and err.count('\n') == 1
+    assert 'in common with' in refused(*words, '--holdout', bags / 'copy')
     assert not (tmp_path / 'd').exists()
 
 

@@ -33,13 +33,6 @@ def test_amounts_are_the_joints_column_times_what_each_sample_moves(columns):
     np.testing.assert_allclose(columns.written_out(), written(columns), rtol=1e-15)
 
 
-def test_products_are_those_of_the_columns_written_out(columns):
-    rows, whole = np.random.default_rng(4).normal(size=(3, ROWS.sum())), written(columns)
-    np.testing.assert_allclose(columns.products(rows), whole @ rows.T, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(columns.normal(), whole @ whole.T, rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(columns.peaks(), np.abs(whole).max(axis=1))
-
-
 def test_pieces_of_one_joint_are_joined_and_keep_their_order(columns):
     other = Piece(np.ones((2, ROWS.sum())))
     pieces = [Piece(columns.each[:1], columns.joint), Piece(columns.each[1:], columns.joint)]

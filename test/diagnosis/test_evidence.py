@@ -22,16 +22,12 @@ def wandering(rho, samples, components, seed=0):
     return np.array(list(accumulate(push, lambda last, new: rho * last + new)))
 
 
-@pytest.mark.parametrize('rho', [0.3, 0.6, 0.9])
+@pytest.mark.parametrize('rho', [0.0, 0.3, 0.6, 0.9])
 def test_the_share_of_independent_rows_is_that_of_an_autoregression(rho):
     residual = wandering(rho, 60000, 3).ravel()
     share = effective_share(residual, (3,), (60000,))
-    assert share == pytest.approx((1.0 - rho) / (1.0 + rho), rel=0.08)
-
-
-def test_every_row_of_white_noise_counts():
-    share = effective_share(wandering(0.0, 20000, 6).ravel(), (6,), (20000,))
-    assert 0.95 < share <= 1.0
+    assert share == pytest.approx((1.0 - rho) / (1.0 + rho), rel=0.08 if rho else 0.05)
+    assert share <= 1.0
 
 
 def test_a_residual_that_alternates_never_counts_more_than_its_rows():

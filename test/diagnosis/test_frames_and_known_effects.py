@@ -93,15 +93,10 @@ def made_up(**changes):
     return replace(Recording('odd', motion, Measurements(t, np.zeros((100, 3)))), **changes)
 
 
-def test_a_recording_without_measurements_is_refused_by_name():
+@pytest.mark.parametrize('measured', [None, Measurements(np.zeros(0), np.zeros((0, 3)))])
+def test_a_recording_without_measurements_is_refused_by_name(measured):
     with pytest.raises(DataError, match='odd holds no measured poses or points'):
-        diagnose([made_up(measured=None)], load('ur5'), experiment=False)
-
-
-def test_no_measurement_at_all_is_refused_too():
-    empty = Measurements(np.zeros(0), np.zeros((0, 3)))
-    with pytest.raises(DataError, match='odd holds no measured poses or points'):
-        diagnose([made_up(measured=empty)], load('ur5'), experiment=False)
+        diagnose([made_up(measured=measured)], load('ur5'), experiment=False)
 
 
 def test_clocks_that_do_not_overlap_are_unsound_with_both_spans():

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.many.small_errors import groups, shrunk_fit
+from weld_twin_core.diagnosis.many.small_errors import shrunk_fit
 
 ROWS = 150
 
@@ -95,26 +95,6 @@ def test_a_spread_learned_is_never_wider_than_that_of_machines_at_large():
     # Where a machine's own spread is far below, its own members decide.
     np.testing.assert_allclose(precision[labels == 1], alone[labels == 1], rtol=2.5)
     assert (precision[labels == 1] > 4.0 * noise * believed[labels == 1]).all()
-
-
-def test_ripple_is_grouped_by_joint_and_band_and_small_groups_are_free():
-    ripple = effect(
-        'transmission_ripple',
-        joint='elbow_joint',
-        amplitude=[0.0] * 5,
-        order=[5, 6, 7, 30, 8],
-        phase=[0.0] * 5,
-    )
-    offsets = [
-        effect('joint_offset', joint=j, offset=0.0)
-        for j in ('elbow_joint', 'wrist_1_joint', 'wrist_2_joint')
-    ]
-    numbers, scales = groups((ripple, *offsets), Beliefs())
-    assert scales.shape == (13,)
-    low, high, rest = numbers[[0, 1, 2, 3, 4, 5, 8, 9]], numbers[[6, 7]], numbers[10:]
-    assert np.unique(low).size == 1 and low[0] >= 0
-    assert (high == -1).all()
-    assert np.unique(rest).size == 1 and rest[0] not in (-1, low[0])
 
 
 FAMILIES = (

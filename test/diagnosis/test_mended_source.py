@@ -91,7 +91,7 @@ def apart(bag, source):
 
 
 @pytest.mark.parametrize('kind', ['zero', 'turn', 'late'])
-def test_a_prediction_on_the_same_source_mends_it_as_the_diagnosis_did(kind, tmp_path, capsys):
+def test_a_prediction_on_the_same_source_mends_it_as_the_diagnosis_did(kind, tmp_path):
     write_robot_yaml(tmp_path / 'robot.yaml', GIVEN)
     recording = late() if kind == 'late' else mixed(kind)
     write_recording(tmp_path / 'rec', recording, GIVEN)
@@ -100,7 +100,6 @@ def test_a_prediction_on_the_same_source_mends_it_as_the_diagnosis_did(kind, tmp
     assert diagnosed(words, found) == 0
     content = json.loads((found / 'diagnosis.json').read_text())
     assert content['unsound'][0]['applied'] and content['unsound'][0]['mend']['do']
-    capsys.readouterr()
     model = ('--model', found / 'diagnosis.json')
     said = done('simulate', *words, *model, '--out', tmp_path / 'out')
     assert float(said.split('RMS ')[1].split(' mm')[0]) < 0.06

@@ -56,14 +56,6 @@ def test_a_column_that_others_can_do_has_no_share_outside(system):
     assert share[0] < 1e-12 and share[1] > 0.5
 
 
-def test_columns_that_repeat_or_vanish_span_no_more(system):
-    columns, y = system
-    twice = np.concatenate([columns[:2], 3.0 * columns[:1], np.zeros((1, ROWS))])
-    assert span_of(twice).shape == (2, ROWS)
-    np.testing.assert_allclose(outside(y, span_of(twice)), left(columns[:2], y), rtol=1e-8)
-    assert span_of(np.zeros((3, ROWS))).shape == (0, ROWS)
-
-
 def test_equations_at_unit_scale_have_the_same_solution(system):
     columns, y = system
     scaled, size = unit_diagonal(columns @ columns.T)

@@ -190,14 +190,6 @@ def test_predictions_are_those_of_the_twin_fitted_again_without_each_stretch(fit
     np.testing.assert_allclose(unseen.predict(kept), expected, atol=0.03)
 
 
-def test_the_error_on_unseen_stretches_exceeds_that_of_the_fit():
-    problem, model = tiny(TRUE, count=40, align=('base', 'tool'))
-    scale = known_scale(problem)
-    found = fit(problem, model.with_found(TRUE), scale)
-    unseen = Unseen.of(problem, scale, found, np.zeros(0))
-    assert unseen.rms(unseen.predict([0, 1, 2])) > unseen.rms(found.residual)
-
-
 def test_frames_by_a_metre_do_not_take_the_place_of_play_that_is_left_out():
     """The tool keeps its direction on a seam, and base and tool move against each other for nothing."""
     robot, play = load('ur5'), effect('backlash', joint='shoulder_pan_joint', width=5e-4)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from command_line import done, weld_twin
+from command_line import done, refused, weld_twin
 
 from weld_twin_nodes.cli.main import OLD, parser_of, renamed
 

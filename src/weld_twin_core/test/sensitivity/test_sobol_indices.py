@@ -6,11 +6,6 @@ from importlib.metadata import version
 
 import numpy as np
 import pytest
-from SALib.analyze import morris as salib_screening
-from SALib.analyze import sobol as salib_analyze
-from SALib.sample import morris as salib_ways
-from SALib.sample import sobol as salib_sample
-from SALib.util import compute_groups_matrix
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import MorrisDesign, SobolDesign, morris_screening, sobol_indices
@@ -45,15 +40,18 @@ def test_morris_keeps_to_seed_zero_as_well():
 
 @pytest.mark.skipif(version('SALib') < '1.6', reason='earlier ones draw from other numbers')
 def test_ways_and_measures_of_morris_are_those_of_salib():
+    from SALib.analyze import morris as measured  # takes half a second, which collecting is spared
+    from SALib.sample import morris as drawn
+
     names = tuple('abcde')
     design = MorrisDesign(names, 6, seed=4)
     problem = {'num_vars': 5, 'names': list(names), 'bounds': [[0.02, 0.98]] * 5}
     asked = {'num_levels': 8}
     seeds = [np.random.default_rng([4, k]) for k in range(2)]
-    runs = salib_ways.sample(problem, 6, seed=seeds[0], **asked)
+    runs = drawn.sample(problem, 6, seed=seeds[0], **asked)
     np.testing.assert_allclose(design.samples(), runs, rtol=1e-14)
     results = np.sin(runs @ np.arange(1.0, 6.0)) + runs[:, 0] * runs[:, 4]
-    wanted = salib_screening.analyze(problem, runs, results, seed=seeds[1], **asked)
+    wanted = measured.analyze(problem, runs, results, seed=seeds[1], **asked)
     found = design.screening(results)
     for key, value in (
         ('mu_star', found.mu_star),
@@ -98,16 +96,20 @@ def test_convergence_tells_of_half_and_all_samples():
 
 @pytest.mark.parametrize('groups', [None, tuple('ghgfh')])
 def test_design_indices_and_intervals_are_those_of_salib(groups):
+    from SALib.analyze import sobol as measured
+    from SALib.sample import sobol as drawn
+    from SALib.util import compute_groups_matrix
+
     problem = {'num_vars': 5, 'names': list('abcde'), 'bounds': [[0.0, 1.0]] * 5}
     if groups:
         problem['groups'] = list(groups)
-    theirs = salib_sample.sample(problem, 64, calc_second_order=False, seed=7)
+    theirs = drawn.sample(problem, 64, calc_second_order=False, seed=7)
     design = SobolDesign(tuple('abcde'), 64, groups, 7)
     np.testing.assert_array_equal(design.samples(), theirs)
     _, names = compute_groups_matrix(list(groups or 'abcde'))
     assert design.labels == tuple(names)
     runs = theirs @ np.arange(5.0) + 3.0 * theirs[:, 0] * theirs[:, 4] ** 2
-    wanted = salib_analyze.analyze(problem, runs, calc_second_order=False, seed=7)
+    wanted = measured.analyze(problem, runs, calc_second_order=False, seed=7)
     found = design.indices(runs)
     for key, value in (
         ('S1', found.first),

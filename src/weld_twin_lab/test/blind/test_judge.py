@@ -39,10 +39,6 @@ def test_a_verdict_is_worth_what_it_says_of_the_causes(case, verdict, named, rig
     assert (judged.named, judged.right) == (named, right)
 
 
-def test_a_set_that_cannot_be_told_apart_counts_once_for_two_causes():
-    assert not judge(TWO, diagnosis('ambiguous', [A, B])).named
-
-
 def test_the_like_of_an_ambiguous_construction_is_as_good_as_the_truth():
     case = truth('ambiguous', [offset('a')], alike=[[list(BASE)]])
     assert judge(case, diagnosis('identified', [BASE])).right

@@ -54,12 +54,6 @@ def test_no_traceback_and_nothing_absurd(draw):
         assert len(came['sentence'].split()) > 3
 
 
-def test_every_value_is_drawn():
-    for name, values in VALUES.items():
-        met = {getattr(draw, name) for draw in spread()}
-        assert met == set(values) or len(values) > DRAWS, name
-
-
 SLIDE = Draw('slide', False, 3, False, '', 0, 0.02, 0.0, 1, 0.0, 0, 'none', False, 0)
 """One axis that hardly moves, measured without noise."""
 

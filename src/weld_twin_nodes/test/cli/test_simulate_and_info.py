@@ -158,8 +158,8 @@ def test_an_existing_bag_is_not_overwritten(tmp_path):
 
 @pytest.mark.parametrize('words', [(), ('dance',), ('simulate',), ('bag',), ('bag', 'info')])
 def test_wrong_usage_exits_with_2(words):
-    result = refused(*words)
-    assert result
+    result = weld_twin(*words)
+    assert result.code == 2 and result.err
 
 
 def test_help_is_quick_because_it_imports_little():

@@ -136,13 +136,6 @@ def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, words, reason)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_directory_of_something_else_is_not_replaced(cell, tmp_path):
-    (tmp_path / 'thesis.tex').write_text('years of work')
-    said = refused('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path)
-    assert 'holds something else' in said
-    assert (tmp_path / 'thesis.tex').read_text() == 'years of work'
-
-
 def twin_poses(bag):
     with BagReader(bag) as reader:
         rows = [

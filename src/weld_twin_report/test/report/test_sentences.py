@@ -100,23 +100,6 @@ def test_reasons_are_told_in_words():
     )
 
 
-def test_the_orders_of_a_ripple_are_told_largest_first():
-    ripple = effect_from_mapping(
-        {
-            'effect': 'transmission_ripple',
-            'joint': 'j',
-            'amplitude': [1e-4, 3e-4],
-            'order': [1, 80],
-            'phase': [0.5, -1.0],
-        }
-    )
-    rows = parameter_rows(ripple, {'amplitude': [1e-5, 1e-5], 'phase': [0.1, 0.1]})
-    assert [(name, plain(text)) for name, text in rows] == [
-        ('order 80', '0.01719 ± 0.00057° (0.3 mrad) at -57.3 ± 5.7°'),
-        ('order 1', '0.00573 ± 0.00057° (0.1 mrad) at 28.6 ± 5.7°'),
-    ]
-
-
 def test_a_vector_is_told_in_one_row():
     tool = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-3, 0, -2e-3]})
     rows = parameter_rows(tool, {'xyz': [1e-5, 1e-5, 1e-5]})

@@ -11,7 +11,7 @@ from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.programs.plain_controller import tool_pose
+from weld_twin_lab.programs.plain import tool_pose
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_msgs_py.robots import read_robot_yaml

@@ -20,7 +20,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.dated import JointSlip, ToolSlip
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
-from weld_twin_lab.programs.plain_controller import _frames, tool_pose
+from weld_twin_lab.programs.plain import _frames, tool_pose
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects

@@ -12,8 +12,8 @@ from command_line import done, refused, weld_twin
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
-from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_lab.programs.plain_controller import along, joints_for, tool_pose
+from weld_twin_lab.programs import plain as readers
+from weld_twin_lab.programs.plain import along, joints_for, tool_pose
 from weld_twin_msgs_py.robots import write_robot_yaml
 
 MADE = Path(__file__).parent / 'made'

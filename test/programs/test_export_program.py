@@ -10,8 +10,8 @@ import yaml
 from command_line import done, refused
 
 import weld_twin_core as wt
-from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_lab.programs.plain_controller import joints_for, tool_pose
+from weld_twin_lab.programs import plain as readers
+from weld_twin_lab.programs.plain import joints_for, tool_pose
 
 CELLS = {
     'krl': ('kuka_kr16_2', 'src', readers.krl, 1e-7),

@@ -13,7 +13,7 @@ import yaml
 from command_line import done
 from scipy.spatial.transform import Rotation
 
-from weld_twin_lab.programs import plain_readers as readers
+from weld_twin_lab.programs import plain as readers
 
 pin = pytest.importorskip('pinocchio', reason='the arms are worked out by another library')
 

@@ -13,8 +13,8 @@ from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.programs import plain_readers as readers
-from weld_twin_lab.programs.plain_controller import along, driven, tool_pose
+from weld_twin_lab.programs import plain as readers
+from weld_twin_lab.programs.plain import along, driven, tool_pose
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.robots import write_robot_yaml
 

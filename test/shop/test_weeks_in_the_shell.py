@@ -11,7 +11,7 @@ from command_line import done, weld_twin
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm import catalog
-from weld_twin_lab.programs.plain_controller import tool_pose
+from weld_twin_lab.programs.plain import tool_pose
 
 ROBOT = 'kuka_kr6_r900'
 MODEL = catalog.load(ROBOT)

@@ -29,8 +29,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.recording import JointMotion
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict
 from weld_twin_msgs_py.messages import from_messages

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 from .arm.rotation import moved, skew
 from .arrays import Array
 from .cameras.bodies import Bodies, bodies
-from .cameras.lens import UNKNOWNS, Lens
-from .cameras.sightings import Fitted, Sightings, Target
+from .cameras.sightings import UNKNOWNS, Fitted, Lens, Sightings, Target
 from .errors import DataError
 from .pose_noise import Common, PoseNoise
 from .recording import Measurements, Recording
@@ -122,9 +121,7 @@ class _State:
         at = own + target[:, :3, 3]
         turn = np.where(forth[:, None, None], tool[:, :3, :3], _swap(tool[:, :3, :3]))
         there = np.where(
-            forth[:, None],
-            _times(turn, at) + tool[:, :3, 3],
-            _times(turn, at - tool[:, :3, 3]),
+            forth[:, None], _times(turn, at) + tool[:, :3, 3], _times(turn, at - tool[:, :3, 3])
         )
         back = _swap(eye[:, :3, :3])
         away = there - eye[:, :3, 3]

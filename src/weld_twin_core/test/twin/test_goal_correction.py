@@ -17,8 +17,7 @@ from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import compensate
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal, course, fine_times

@@ -15,8 +15,7 @@ from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.effects import REGISTRY, Quantization, ToolSlip
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features, shown
 from weld_twin_core.twin.posterior import Posterior, expected_poses, pose_covariances

@@ -15,8 +15,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.predicting.allowed import allowed
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.goal_correction import Start, corrected_goal

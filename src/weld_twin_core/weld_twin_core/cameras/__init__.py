@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cameras as a measurement: what they saw, in pixels; `weld_twin_core.bundle` makes poses of it."""
 
-from .lens import Lens
-from .sightings import Camera, Sightings, Target, described
+from .sightings import Camera, Lens, Sightings, Target, described
 
 __all__ = ['Camera', 'Lens', 'Sightings', 'Target', 'described']

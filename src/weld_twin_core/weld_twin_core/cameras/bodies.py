@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from ..arm.rotation import nearest_rotation, rotation_matrix, rotation_vector, skew, transform
 from ..arrays import Array
 from ..errors import DataError
-from .lens import Lens
-from .sightings import Sightings
+from .sightings import Lens, Sightings
 
 _LEVER = 0.5
 """Length [m] at which a turn counts against a shift where views are compared: a tool's reach."""

@@ -197,9 +197,7 @@ class PedestalTilt(LinearEffect):
         meaning="the pedestal under the robot bends under the arm's weight",
         formula='the base leans about its x and y by compliance · moment about each, the moment'
         ' of links, declared payload and wrench about its origin',
-        apart={
-            'joint_compliance': 'put a level or a dial gauge on the base while the arm moves',
-        },
+        apart={'joint_compliance': 'put a level or a dial gauge on the base while the arm moves'},
         entered='program',
         depends_on='load',
         place='base',
@@ -293,7 +291,7 @@ class AxisCompliance(LinearEffect):
         formula='the frame in which the joint turns leans about its x and y by compliance · moment '
         'about each, the moment of links, payload and wrench about its origin',
         apart={
-            'joint_compliance': 'put a dial gauge on either side of the joint while the arm moves',
+            'joint_compliance': 'put a dial gauge on either side of the joint while the arm moves'
         },
         entered='program',
         depends_on='load',
@@ -394,7 +392,7 @@ class ToolSag(LinearEffect):
         'row, down the direction of gravity in the flange; the tool turns about the flange by the '
         'least that takes it there',
         apart={
-            'joint_compliance': 'put a dial gauge between flange and tool tip while the wrist turns',
+            'joint_compliance': 'put a dial gauge between flange and tool tip while the wrist turns'
         },
         entered='program',
         depends_on='load',

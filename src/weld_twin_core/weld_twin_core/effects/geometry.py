@@ -141,9 +141,7 @@ class LinkOffset(_LinkError):
         title='link offset error',
         meaning='an offset along an axis in the model of the robot is wrong',
         formula='d → d + dd',
-        apart={
-            'link_offset': 'only their sum moves the tool, so mending either mends both',
-        },
+        apart={'link_offset': 'only their sum moves the tool, so mending either mends both'},
     )
     channel = 'd'
     parameters = (
@@ -283,9 +281,7 @@ class ToolPose(FrameError):
         title='tool pose error',
         meaning='the tool is not where its tool frame says',
         formula='R → R exp(rotvec), origin → origin + xyz, flange axes',
-        apart={
-            'base_pose': 'measure the tool by itself',
-        },
+        apart={'base_pose': 'measure the tool by itself'},
         entered='tool',
         place='tool',
         changes_in_use=True,
@@ -327,7 +323,7 @@ class RootPose(FrameError):
         "+ xyz, axes of the base of the robot's rows; of a cell with a positioner",
         apart={
             'joint_offset': 'measure where the positioner stands beside the robot (points on both '
-            'feet), or master the joint with its own gauge',
+            'feet), or master the joint with its own gauge'
         },
         entered='root',
         depends_on='constant',

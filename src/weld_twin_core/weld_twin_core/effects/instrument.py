@@ -42,9 +42,7 @@ class MeasurementScale(LinearEffect):
         title='scale error of the instrument',
         meaning="the instrument's millimetre is too long or too short",
         formula="p → (1 + scale) p, about the world's origin",
-        apart={
-            'link_length': 'measure a bar of known length',
-        },
+        apart={'link_length': 'measure a bar of known length'},
         entered='the scale of the instrument',
         depends_on='place',
         place='instrument',
@@ -116,7 +114,7 @@ class TimeDelay(Effect):
         formula='a measurement stamped t shows the robot at t − delay',
         apart={
             'servo_lag': 'record commanded and measured joints side by side, or trigger both recordings '
-            'with one signal',
+            'with one signal'
         },
         entered='its clocks',
         depends_on='speed',
@@ -215,9 +213,7 @@ class Drift(LinearEffect):
         title='drift of the frame',
         meaning='everything measured creeps with time',
         formula='p → p + xyz_rate (t − t_first)',
-        apart={
-            'thermal_growth': 'measure a fixed point beside the arm while it works',
-        },
+        apart={'thermal_growth': 'measure a fixed point beside the arm while it works'},
         entered='what the frame stands on, or of the temperature',
         depends_on='time',
         place='base',
@@ -272,9 +268,7 @@ class Refraction(LinearEffect):
         meaning='warm air bends the beam of the instrument',
         formula='p → p + κ (r·r warming / 2 − (warming·r) r), r from the instrument (the '
         "world's origin) to p, κ = 9.27e-7 1/K for air",
-        apart={
-            'base_pose': 'measure from a second place of the instrument',
-        },
+        apart={'base_pose': 'measure from a second place of the instrument'},
         entered='warm air bent the line of sight',
         depends_on='place',
         place='instrument',

@@ -61,9 +61,7 @@ class Payload(Effect):
         title='wrong payload',
         meaning='the load at the flange is not what was declared',
         formula='τ → τ + torque of mass at com of the tool, on top of the declared payload',
-        apart={
-            'joint_compliance': 'weigh what hangs on the flange',
-        },
+        apart={'joint_compliance': 'weigh what hangs on the flange'},
         entered='load',
         depends_on='load',
         place='load',
@@ -135,9 +133,7 @@ class HosePull(LinearEffect):
         meaning='the hoses pull at the flange',
         formula='τ → τ + torque of a pull at the flange, force − stiffness · p, p the flange in'
         ' the base frame',
-        apart={
-            'payload': 'take the hose package off the flange, or weigh what hangs on it',
-        },
+        apart={'payload': 'take the hose package off the flange, or weigh what hangs on it'},
         entered='program',
         depends_on='load',
         place='load',

@@ -87,9 +87,7 @@ class Friction(MemoryEffect):
         meaning='a joint lags behind while it moves, and gives that up when it rests',
         formula='θ → θ − windup (z + asymmetry u), ż = (sign θ̇ − z) abs(θ̇) / travel − z / '
         'release, u̇ = (1 − u) abs(θ̇) / travel − u / release, both 0 at first',
-        apart={
-            'backlash': 'push the link to and fro while the motor holds: only play gives way',
-        },
+        apart={'backlash': 'push the link to and fro while the motor holds: only play gives way'},
         entered="the joint's gear, bearings and grease",
         depends_on='direction',
         changes_in_use=True,

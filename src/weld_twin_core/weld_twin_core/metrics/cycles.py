@@ -236,12 +236,12 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
         return None
     anchors = [joints.q[round(share * (joints.t.size - 1))] for share in (0.0, 0.25, 0.5)]
     anchors += [p.q for p in pose_cycles(stops(recording), robot) if p.t.size > 1]
-    groups = [_of_one_path(joints, spans(joints, q)) for q in anchors]
+    groups = [_of_one_path(joints, _spans(joints, q)) for q in anchors]
     best = max(groups, key=lambda group: sum(s.end - s.start for s in group[1:]))
     return _crossings(measured, joints, robot, best) if len(best) > 1 else None
 
 
-def spans(joints: JointMotion, anchor: Array) -> list[_Span]:
+def _spans(joints: JointMotion, anchor: Array) -> list[_Span]:
     """Return the stretches of a motion from leaving joint positions (n,) to coming back there."""
     a, step = joints.q[:-1], np.diff(joints.q, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-30)

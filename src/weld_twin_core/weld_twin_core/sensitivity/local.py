@@ -212,7 +212,7 @@ def _at_tolerance(
 
 
 @dataclass(frozen=True, eq=False)
-class Posture:
+class _Posture:
     """
     How the arm stands along a seam, shape (N,) each.
 
@@ -225,9 +225,9 @@ class Posture:
     amplification: Array
 
 
-def posture(study: Study) -> Posture:
+def posture(study: Study) -> _Posture:
     """Return condition number, manipulability and largest gain along a seam."""
     strength = np.linalg.svd(jacobian(study.robot, study.q)[..., :3, :], compute_uv=False)
     smallest = np.maximum(strength[..., -1], np.finfo(float).tiny)
     gain = np.asarray(strength[..., 0], dtype=np.float64)
-    return Posture(gain / smallest, strength.prod(axis=-1), gain)
+    return _Posture(gain / smallest, strength.prod(axis=-1), gain)

@@ -39,7 +39,7 @@ class WeldTolerance:
 
 
 @dataclass(frozen=True)
-class Probability:
+class _Probability:
     """A frequency with its 95 % Clopper-Pearson interval."""
 
     value: float
@@ -55,9 +55,9 @@ class ToleranceStack:
     seed: int
     percentiles: dict[str, Array]
     """Value and 95 % interval at `_PERCENTILES`, by the number of `Outcomes`, shape (K, 3)."""
-    inside_across: Probability
-    inside_stickout: Probability
-    inside_both: Probability
+    inside_across: _Probability
+    inside_stickout: _Probability
+    inside_both: _Probability
     """That the whole seam stays inside the weld's tolerance."""
     tolerance: WeldTolerance
 
@@ -148,11 +148,11 @@ def tolerance_stack(
     )
 
 
-def _frequency(inside: np.ndarray) -> Probability:
+def _frequency(inside: np.ndarray) -> _Probability:
     hits, runs, tail = int(inside.sum()), inside.size, 0.5 * (1.0 - _COVERAGE)
     low = float(betaincinv(hits, runs - hits + 1, tail)) if hits else 0.0
     high = float(betaincinv(hits + 1, runs - hits, 1.0 - tail)) if hits < runs else 1.0
-    return Probability(hits / runs, low, high)
+    return _Probability(hits / runs, low, high)
 
 
 def _percentiles(values: Array) -> Array:

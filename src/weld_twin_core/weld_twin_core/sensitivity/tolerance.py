@@ -16,7 +16,7 @@ from ..effects import REGISTRY, Effect, Parameter, effect_from_mapping
 from ..errors import ModelError
 from .distribution import Distribution
 
-FAMILIES = ('joint_offset', 'link_length', 'link_twist', 'backlash', 'base_pose')
+_FAMILIES = ('joint_offset', 'link_length', 'link_twist', 'backlash', 'base_pose')
 """The error sources of the paper's study (V.i); `base_pose` is its initialization offset."""
 _OWN_KEYS = ('effect', 'joint', 'parameter', 'index')
 
@@ -62,7 +62,7 @@ class Tolerance:
 
 
 def default_tolerances(
-    robot: Robot, families: Iterable[str] = FAMILIES, scale: float = 1.0
+    robot: Robot, families: Iterable[str] = _FAMILIES, scale: float = 1.0
 ) -> tuple[Tolerance, ...]:
     """
     Return tolerances of the typical magnitude of every parameter of some effects.

@@ -248,12 +248,7 @@ def advise(
 
 class _Search:
     def __init__(
-        self,
-        robot: Robot,
-        path: Path,
-        tolerances: tuple[Tolerance, ...],
-        torch: Torch,
-        room: Room,
+        self, robot: Robot, path: Path, tolerances: tuple[Tolerance, ...], torch: Torch, room: Room
     ) -> None:
         self.robot, self.length, self.scatter = robot, path.length, _Scatter.of((), tolerances)
         self.torch, self.room = torch, room

@@ -29,8 +29,7 @@ from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
 from .compensation import commandable
-from .directions import Directions
-from .discrepancy import Discrepancy, Where
+from .directions import Directions, Discrepancy, Where
 from .domain import Domain
 from .features import Features, jumps, with_expected_effort
 from .poses import Poses
@@ -396,11 +395,7 @@ def places(count: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
 
 
 def pose_covariances(
-    posterior: Posterior,
-    twin: Twin,
-    recording: Recording,
-    at: Array,
-    setup: int = 0,
+    posterior: Posterior, twin: Twin, recording: Recording, at: Array, setup: int = 0
 ) -> Array:
     """Return `Posterior.pose_covariance` of a long motion at stamps (M,) [s], in pieces, (M, 6, 6)."""
     parts = [

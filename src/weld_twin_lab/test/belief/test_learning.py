@@ -12,6 +12,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_lab.belief import learning
 from weld_twin_lab.belief.judged import Example
 from weld_twin_lab.belief.learning import (
+    TERMS,
     bounded,
     count_of,
     fitted,
@@ -20,8 +21,7 @@ from weld_twin_lab.belief.learning import (
     restated,
     upper_limit,
 )
-from weld_twin_lab.belief.mix import SHARES, mixed
-from weld_twin_lab.belief.terms import TERMS
+from weld_twin_lab.belief.trial import SHARES, mixed
 
 
 @pytest.fixture(autouse=True)

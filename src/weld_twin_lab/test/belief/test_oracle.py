@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.belief import oracle
-from weld_twin_lab.belief.mix import SEVERAL, drawn
+from weld_twin_lab.belief.trial import SEVERAL, drawn
 
 pytest.importorskip('mujoco')
 

@@ -9,10 +9,17 @@ import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
 from weld_twin_lab.belief.judged import complete, kept, sets_hold
-from weld_twin_lab.belief.levels_of_truth import VISIBLE, whole
-from weld_twin_lab.belief.mix import CROWDED, MOST, SEVERAL, drawn, lot_of
-from weld_twin_lab.belief.trial import diagnosed, recordings_of, tried
-from weld_twin_lab.belief.visible import shown
+from weld_twin_lab.belief.trial import (
+    CROWDED,
+    MOST,
+    SEVERAL,
+    diagnosed,
+    drawn,
+    lot_of,
+    recordings_of,
+    tried,
+)
+from weld_twin_lab.belief.truth import VISIBLE, shown, whole
 
 PLAY, LINK, ZERO = (
     ('backlash', 'elbow_joint'),

@@ -8,9 +8,8 @@ import pytest
 
 from weld_twin_lab.belief import trial
 from weld_twin_lab.belief.judged import kept
-from weld_twin_lab.belief.mix import EVERYWHERE
-from weld_twin_lab.belief.trial import diagnosed
-from weld_twin_lab.belief.visible import HALF, there
+from weld_twin_lab.belief.trial import EVERYWHERE, diagnosed
+from weld_twin_lab.belief.truth import HALF, there
 from weld_twin_lab.blind.cause_sizes import site
 
 pytest.importorskip('mujoco')

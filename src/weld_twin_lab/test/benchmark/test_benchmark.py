@@ -12,9 +12,20 @@ from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.errors import DataError
 from weld_twin_lab.benchmark.all_races import written_out
-from weld_twin_lab.benchmark.arms import DH_KEYS, calibrated_arm, links, random_positions
 from weld_twin_lab.benchmark.peers import find_peers
-from weld_twin_lab.benchmark.race import LEFT_OUT, OWN, Contender, Outcome, Workload, race, short
+from weld_twin_lab.benchmark.race import (
+    DH_KEYS,
+    LEFT_OUT,
+    OWN,
+    Contender,
+    Outcome,
+    Workload,
+    calibrated_arm,
+    links,
+    race,
+    random_positions,
+    short,
+)
 from weld_twin_nodes.cli import main
 
 ROOT = Path(__file__).parents[4]

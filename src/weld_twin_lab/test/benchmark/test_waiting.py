@@ -9,7 +9,7 @@ from datetime import date
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.benchmark.costs import cost_of
+from weld_twin_lab.benchmark.race import cost_of
 from weld_twin_lab.benchmark.waiting import measured
 from weld_twin_nodes.cli import main
 

@@ -23,8 +23,8 @@ from weld_twin_lab.blind.cause_sizes import (
     machines,
     scaled,
 )
-from weld_twin_lab.blind.deck import KINDS, STRATA, Lot, lots
-from weld_twin_lab.blind.displacement import correlation, rigid, rms
+from weld_twin_lab.blind.making import KINDS, STRATA, Lot, lots
+from weld_twin_lab.blind.measures import correlation, rigid, rms
 from weld_twin_lab.blind.recorded_motion import motion
 
 pytest.importorskip('mujoco')

@@ -7,8 +7,16 @@ import pytest
 
 from weld_twin_core import forward
 from weld_twin_core.arm.robot import Robot
-from weld_twin_lab.cells.case import KINDS, beyond_frames, cell, opened, postures, really
-from weld_twin_lab.cells.study import named_as_tracked, page
+from weld_twin_lab.cells.study import (
+    KINDS,
+    beyond_frames,
+    cell,
+    named_as_tracked,
+    opened,
+    page,
+    postures,
+    really,
+)
 from weld_twin_lab.plant.exponentials import Motion
 from weld_twin_lab.plant.tracker import Eye, looking, seen
 

@@ -14,16 +14,17 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_lab.contest.course import commands, run_all
-from weld_twin_lab.contest.course import page as told_page
-from weld_twin_lab.contest.entrants import geometry
-from weld_twin_lab.contest.open_form import (
+from weld_twin_lab.contest.course import (
     ContestAnswer,
+    commands,
     read_answer,
     read_case,
+    run_all,
     write_answer,
     write_case,
 )
+from weld_twin_lab.contest.course import page as told_page
+from weld_twin_lab.contest.entrants import geometry
 from weld_twin_lab.contest.scores import Sealed, page, point
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 

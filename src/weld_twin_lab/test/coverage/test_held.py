@@ -11,10 +11,8 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.blind.blind_cell import BlindCell, Take
-from weld_twin_lab.blind.deck import Lot
-from weld_twin_lab.blind.making import SealedCase, one_arm
-from weld_twin_lab.coverage.held import inside_region, oracle_sigma
-from weld_twin_lab.coverage.sealed import of_case
+from weld_twin_lab.blind.making import Lot, SealedCase, one_arm
+from weld_twin_lab.coverage.sealed import inside_region, of_case, oracle_sigma
 from weld_twin_lab.coverage.study import page, promise_table, summaries
 from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.tracker import Tracker

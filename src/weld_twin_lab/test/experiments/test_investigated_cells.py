@@ -57,8 +57,8 @@ def test_only_what_was_said_counts():
 
 def test_a_sealed_cell_records_with_what_was_changed():
     pytest.importorskip('mujoco', reason='the plant needs MuJoCo')
-    from weld_twin_lab.blind.deck import lots
-    from weld_twin_lab.experiments.trial import SealedCell, stations
+    from weld_twin_lab.blind.making import lots
+    from weld_twin_lab.experiments.study import SealedCell, stations
     from weld_twin_nodes.offline.set_up_changes import set_up_change, with_changes
 
     number, lot = next(
@@ -79,7 +79,7 @@ def test_a_sealed_cell_records_with_what_was_changed():
 
 
 def test_an_experiment_begins_when_it_is_run_and_is_followed_at_an_even_rate():
-    from weld_twin_lab.experiments.trial import as_motion
+    from weld_twin_lab.experiments.study import as_motion
 
     robot, t = load('ur5'), np.array([7.0, 7.5, 8.5, 9.0])
     asked = {'joint_names': robot.joint_names, 't': t, 'q': np.outer(t - 7.0, np.ones(6))}

@@ -7,7 +7,7 @@ import pytest
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_lab.programs.corrections import counted, page, path_accuracy, totals
-from weld_twin_lab.programs.plain_controller import driven, tool_pose
+from weld_twin_lab.programs.plain import driven, tool_pose
 from weld_twin_lab.programs.sealed_seams import CELLS, robots_of
 
 

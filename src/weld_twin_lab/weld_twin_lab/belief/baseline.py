@@ -31,10 +31,20 @@ from ..blind.making import MOTIONS_OF, truth_of
 from ..blind.measures import Estimate, bootstrap, calibration_error, share
 from ..blind.scoring import CONFIDENT, is_sure
 from ..study import Study, require_simulator, tabled
-from .levels_of_truth import Levels, alike_by_structure, levels_of, whole
-from .mix import MOST as CAUSES
-from .mix import SEVERAL, SPANS, drawn
-from .trial import diagnosed, read_rows, recordings_of, rounded, said, tried, write_rows
+from .trial import MOST as CAUSES
+from .trial import (
+    SEVERAL,
+    SPANS,
+    diagnosed,
+    drawn,
+    read_rows,
+    recordings_of,
+    rounded,
+    said,
+    tried,
+    write_rows,
+)
+from .truth import Levels, alike_by_structure, levels_of, whole
 
 MOST = 2 * CAUSES
 """Effects of a model that are kept; more are many small errors."""

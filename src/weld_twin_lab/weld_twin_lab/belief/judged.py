@@ -17,9 +17,8 @@ from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.effects.registry import REGISTRY
 
 from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge
-from .levels_of_truth import FEW, alike_by_structure, levels_of, numbers, whole
-from .visible import HALF, LARGE
-from .visible import right as right_everywhere
+from .truth import FEW, HALF, LARGE, alike_by_structure, levels_of, numbers, whole
+from .truth import right as right_everywhere
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""

@@ -25,12 +25,10 @@ from weld_twin_core.arrays import Array
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
 from ..blind.cause_sizes import CAUSES, FAMILIES, MOVING, SIZES, Cause, plausible, scaled, site
 from ..blind.cause_sizes import draw as drawn_cause
-from ..blind.deck import STRATA
-from ..blind.displacement import rms
-from ..blind.making import SealedCase
-from .levels_of_truth import alike_by_structure
-from .mix import COMMON, OFTEN, SEVERAL, drawn
-from .visible import STEP, TURNING, changed, fitted, frame_columns, moved
+from ..blind.making import STRATA, SealedCase
+from ..blind.measures import rms
+from .trial import COMMON, OFTEN, SEVERAL, drawn
+from .truth import STEP, TURNING, alike_by_structure, changed, fitted, frame_columns, moved
 
 DRAWS = 2
 """Causes drawn of each family at each joint: phases and instants differ; sizes are fitted."""

@@ -29,12 +29,11 @@ from ..blind.measures import (
 )
 from ..blind.scoring import NOT_IN_LIBRARY
 from ..study import Study, require_simulator, tabled
-from . import learning, terms
+from . import learning
 from .judged import Example, examples_of, kept
 from .learning import log_loss, unseen, upper_limit
-from .mix import USUAL
 from .oracle import certainty
-from .trial import read_rows, seeds_of, tried, write_rows
+from .trial import USUAL, read_rows, seeds_of, tried, write_rows
 
 Kept = Mapping[str, Any]
 SEEN, PLAIN = 1.0, 3.0
@@ -183,7 +182,7 @@ def with_oracle(rows: Sequence[dict[str, Any]], runner: Runner) -> list[dict[str
     return [{**row, 'oracle': p} for row, p in zip(rows, runner.run(tasks), strict=True)]
 
 
-def fit(rows: Sequence[Mapping[str, Any]], risk: float = terms.RISK) -> dict[str, Any]:
+def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[str, Any]:
     """Return the content of the file of weights that rows of `judged.kept` teach."""
     own = [row for row in rows if row.get('examples')]
     card = {

@@ -27,9 +27,20 @@ from weld_twin_core.motion.inverse import solve_path
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.whole_files import write_json
 
-from .arms import calibrated_arm, random_positions, smooth_motion
 from .peers import PACKAGES, Peer, find_peers
-from .race import OWN, REFERENCE, Contender, Workload, brief, lines, page, race
+from .race import (
+    OWN,
+    REFERENCE,
+    Contender,
+    Workload,
+    brief,
+    calibrated_arm,
+    lines,
+    page,
+    race,
+    random_positions,
+    smooth_motion,
+)
 
 PLAIN = 'weld_twin, plain chain'
 LOOPED = 500

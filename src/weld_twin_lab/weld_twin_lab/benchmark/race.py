@@ -1,19 +1,123 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Contenders taking turns, and what came of it."""
+"""Contenders taking turns on the same arm, positions and seams: time and memory, and what came of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
+
+DH_KEYS = ('theta', 'd', 'a', 'alpha')
+SIZE = 1e-3
+"""Standard deviation of an error [rad or m], that of an arm which was never calibrated."""
+
+
+def calibrated_arm() -> Robot:
+    """Return a UR5 whose DH values are all off nominal by about a millimetre or milliradian."""
+    rng = np.random.default_rng(5)
+    arm = load('ur5')
+    rows: dict[str, Any] = {
+        key: getattr(arm, key) + SIZE * rng.normal(size=arm.n) for key in DH_KEYS
+    }
+    tool = transform(np.eye(3), np.array([0.03, -0.02, 0.25]))
+    return replace(arm, **rows, T_flange_tool=tool)
+
+
+def random_positions(arm: Robot, count: int, seed: int = 0) -> Array:
+    """Return joint positions of which no two are the same, shape (count, n) [rad]."""
+    return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, arm.n))
+
+
+def smooth_motion(arm: Robot, count: int) -> Array:
+    """Return joint positions along a smooth seam, shape (count, n) [rad]."""
+    s = np.linspace(0.0, 1.0, count)[:, None]
+    phases = np.arange(arm.n)
+    rates = 0.7 + 0.13 * ((5 * phases) % 7)
+    return np.array([0.3, -1.2, 1.5, -1.9, -1.5, 0.2, 0.5])[phases] + 0.2 * np.sin(
+        s * rates + phases
+    )
+
+
+def links(robot: Robot) -> list[Array]:
+    """Return the constant transforms between joint axes, for ``links[0] Rz(q0) links[1] ...``."""
+    out = [np.array(robot.T_world_base)]
+    for i in range(robot.n):
+        out.append(turn_z(robot.theta[i], robot.d[i]) @ turn_x(robot.alpha[i], robot.a[i]))
+    out[-1] = out[-1] @ robot.T_flange_tool
+    return out
+
+
+def turn_z(angle: float, along: float) -> Array:
+    """Return Rz(angle) Tz(along), shape (4, 4)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, along], [0, 0, 0, 1.0]])
+
+
+def turn_x(angle: float, along: float) -> Array:
+    """Return Rx(angle) Tx(along), shape (4, 4)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0, along], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+
+
+_SMALL = Path(__file__).with_name('small_parent.py')
+
+
+class Cost(NamedTuple):
+    """Seconds on the clock, seconds of processor time, and the largest process [bytes]."""
+
+    wall: float
+    cpu: float
+    peak: float
+
+
+def cost_of(
+    words: Sequence[str],
+    *,
+    environment: Mapping[str, str] | None = None,
+    said: IO[str] | int = subprocess.DEVNULL,
+    limit: float = 0.0,
+) -> tuple[int, Cost]:
+    """
+    Run a program; return its exit code and what it cost.
+
+    The memory of this process does not count, however large it is: see `small_parent`, whose own
+    ten megabytes are the least that can be told.
+
+    said: where what it prints goes, errors too; left out, nowhere.
+    limit: after so long it is killed [s]; 0 for never.
+    """
+    read, write = os.pipe()
+    try:
+        process = subprocess.Popen(
+            [sys.executable, '-I', '-S', str(_SMALL), str(write), str(limit), *words],
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            pass_fds=[write],
+        )
+    finally:
+        os.close(write)
+    with os.fdopen(read, encoding='utf-8') as report:
+        code, wall, cpu, peak = json.loads(report.readline())
+    process.wait()
+    return int(code), Cost(wall, cpu, peak)
+
 
 OWN, REFERENCE = 'weld_twin', 'pinocchio'
 """The contender that the others are compared with."""

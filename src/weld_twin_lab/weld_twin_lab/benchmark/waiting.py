@@ -22,7 +22,7 @@ from weld_twin_core.errors import DataError
 
 from ..study import Study, engine_digest, tabled
 from . import waiting_data as data
-from .costs import Cost, cost_of
+from .race import Cost, cost_of
 
 Entry = dict[str, Any]
 """What one job costs, and when and with which versions that was measured."""

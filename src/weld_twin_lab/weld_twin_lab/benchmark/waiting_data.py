@@ -23,7 +23,7 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_report.history import Database, Entry
 
-from .arms import smooth_motion
+from .race import smooth_motion
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection

@@ -23,7 +23,7 @@ from ..plant.exponentials import Command, PlantRecording
 from ..plant.plant import run
 from ..plant.tracker import Tracker
 from .cause_sizes import Cause
-from .displacement import rigid, rms
+from .measures import rigid, rms
 from .recorded_motion import Motion, motion
 
 SPANS = (20.0, 60.0)

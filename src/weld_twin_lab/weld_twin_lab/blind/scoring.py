@@ -180,13 +180,7 @@ QUESTIONS = (
 """What verdicts are measured by."""
 
 
-def score(
-    cases: Path,
-    truths: Path,
-    results: Path,
-    *,
-    seal_given: str = '',
-) -> dict[str, Any]:
+def score(cases: Path, truths: Path, results: Path, *, seal_given: str = '') -> dict[str, Any]:
     """
     Return the score of verdicts in plain values.
 

@@ -1,18 +1,28 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Drawn goals go through a compensator in a cell, and as many without nodes."""
+"""
+Drawn goals go through a compensator in a cell, and as many without nodes.
+
+In a cell the injector is the real arm, with a controller, a twin, an analyzer and a compensator.
+Every goal runs twice over the same way, once as it is and once by the compensator, each time from
+the same side. What the tool does is heard on `/measured/tool_pose`.
+"""
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from rclpy.action import ActionClient
 
 from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.recording import JointMotion, Recording
@@ -23,24 +33,316 @@ from weld_twin_core.twin.reversals import approached
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import read_json
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
 from weld_twin_nodes.cli.given import Given
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.controller import Controller
 from weld_twin_nodes.offline.correcting import program_model
 
 from ..study import tabled
 from . import write_result
 from .drawn_cells import (
     CHANGES,
+    HOMES,
+    INSIDE,
     NOTHING,
     Arm,
+    DrawnGoal,
     Known,
+    Learned,
     arms_of,
     cell_of,
     drawn_goal,
+    goals_of,
     learned,
     right_and_wrong,
     true_effects,
 )
 from .message_packages import messages_importable
+
+PACE = 20.0
+"""How many times as fast as they say goals run: nothing in these cells hangs on speed."""
+RETURN = 1.5
+"""Length of a way back, or to where a goal begins [s]."""
+NEAR_TURN = np.arange(-0.2, 0.2, 0.01)
+"""Times around a turn [s] at which the arm is looked at too: play is taken up in some hundredths."""
+NOTICE = 30.0
+"""Longest time [s] after a change until goals count."""
+SETTLED = 1.5
+"""Time [s] in which everything that is under way has arrived."""
+JUMP = 4.0
+"""By how much the clock of the measurements jumps [s]: the most that an injector takes."""
+CALM = 10.0
+"""Time [s] without a change in which nothing may be noticed."""
+EACH = 3
+"""Goals after each change."""
+AFTER = 100_000
+"""Number of the first goal after a change: those before are counted from 0."""
+
+
+class CellTrial:
+    """A cell that goals are sent to."""
+
+    def __init__(
+        self, cell: Cell, folder: Path, arm: Arm, models: tuple[Learned, Learned | None]
+    ) -> None:
+        from control_msgs.action import FollowJointTrajectory
+
+        self.cell, self.kind, self.arm, self.name = cell, FollowJointTrajectory, arm, arm.name
+        self.robot, self.causes, self.rng = cell_of(arm.name, arm.seed)
+        self.right, self.wrong = models
+        self.model = folder / 'diagnosis.json'
+        self.model.write_text(self.right.text)
+        self._late = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        cell, robot = self.cell, self.robot
+        self.controller = cell.add(
+            Controller, robot.joint_names, HOMES[self.name], PACE, self._turns
+        )
+        common = {'robot': self.name, 'reliable_inputs': True}
+        cell.start('error_injector', effects=self._effects(), **common)
+        cell.start('forward_kinematics_twin', model=str(self.model), **common)
+        self.analyzer = cell.start('deviation_analyzer', **common)
+        self.compensator = cell.start(
+            'compensator', model=str(self.model), apply=True, managed=False, **common
+        )
+        self.audit: list[dict[str, Any]] = []
+        cell.node.create_subscription(
+            AUDIT.message_class(), '/compensator/audit', self._audited, AUDIT.requested.to_rclpy()
+        )
+        self.measured = cell.collect(MEASURED_POSE.name)
+        self.deviations = cell.collect(DEVIATION.name)
+        action = 'follow_joint_trajectory'
+        self._through = ActionClient(cell.node, self.kind, f'/compensator/{action}')
+        self._direct = ActionClient(cell.node, self.kind, f'/joint_trajectory_controller/{action}')
+        for client in (self._through, self._direct):
+            cell.wait(client.server_is_ready, 'the actions')
+        cell.meet()
+        cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
+
+    def _turns(self, goal: Goal) -> Array:
+        """Return times [s] of a goal around where joints with play turn around: much happens there."""
+        at = fine_times(goal)
+        played = [e['joint'] for e in self.causes if e['effect'] == 'backlash']
+        ways = [course(goal, at).qd[:, self.robot.joint_names.index(name)] for name in played]
+        turns = [at[1:][np.diff(np.sign(qd)) != 0.0] for qd in ways]
+        near = np.concatenate([*turns, at[:1]])[:, None] + NEAR_TURN
+        return np.asarray(near[(near > at[0]) & (near < at[-1])])
+
+    def _audited(self, message: Any) -> None:
+        self.audit.append(json.loads(message.data))
+
+    def _effects(self, *more: dict[str, Any]) -> str:
+        return yaml_text([*self.causes, *more])
+
+    # Goals -----------------------------------------------------------------------------------
+
+    def run(self, goal: Goal, *, through: bool) -> tuple[bool, dict[str, Any]]:
+        """Run a goal; return whether it was taken, and its audit line."""
+        message = self.kind.Goal()
+        message.trajectory.joint_names = list(self.robot.joint_names)
+        message.trajectory.points = self.cell.messages.trajectory_points(*goal)
+        client, lines = (self._through if through else self._direct), len(self.audit)
+        asked = client.send_goal_async(message)
+        self.cell.wait(asked.done, 'the answer')
+        if through:
+            self.cell.wait(lambda: len(self.audit) > lines, 'the audit')
+        line = self.audit[-1] if through else {}
+        if not asked.result().accepted:
+            return False, line
+        result = asked.result().get_result_async()
+        self.cell.wait(result.done, 'the result', limit=60.0)
+        return True, line
+
+    def to(self, q: Array) -> None:
+        """Bring the arm to a posture, uncorrected."""
+        here = self.controller.q
+        t = np.linspace(0.0, RETURN, 16)
+        s = (0.5 - 0.5 * np.cos(np.pi * t / RETURN))[:, None]
+        self.run(Goal(t, here + s * (q - here)), through=False)
+
+    def off(self, goal: Goal, waits: float = 0.0) -> tuple[float, float]:
+        """Return how far the real tool was from where the last goal meant it, RMS and most [m]."""
+        track = {stamp + self._late: t - waits for stamp, t in self.controller.track}
+        self.measured_until(max(track))
+        meant, real = [], []
+        for message in self.measured.messages:
+            t = track.get(from_messages.stamp_ns(message))
+            if t is not None and t >= 0.0:
+                real.append(from_messages.pose(message)[0])
+                meant.append(t)
+        self.measured.messages.clear()
+        self.deviations.messages.clear()
+        way = course(goal, np.minimum(np.array(meant), goal.t[-1]))
+        apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
+        # The arm is looked at more often where it turns; each look stands for its part of the time.
+        share = np.gradient(np.array(meant)) if len(meant) > 1 else np.ones(1)
+        squares = (apart**2).sum(axis=1)
+        return float(np.sqrt(np.average(squares, weights=share))), float(np.sqrt(squares.max()))
+
+    def measured_until(self, stamp: int) -> None:
+        """Wait until the tool was measured at a stamp [ns]."""
+        messages = self.measured.messages
+        self.cell.wait(
+            lambda: bool(messages) and from_messages.stamp_ns(messages[-1]) >= stamp,
+            'the measurements',
+        )
+
+    def judged(self, drawn: DrawnGoal, after: str) -> dict[str, Any]:
+        """Return what became of a goal, run as it is and through the compensator."""
+        goal = drawn.goal
+        came = np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
+        offs = []
+        taken, line = True, dict[str, Any]()
+        for through in (False, True):
+            self.to(goal.q[0] - 0.05 * came)
+            self.to(goal.q[0])
+            taken, line = self.run(goal, through=through)
+            if taken:
+                offs.append(self.off(goal, line.get('waits_s', 0.0)))
+        best = self._best(goal, Start(goal.q[0], False, came))
+        return {
+            'robot': self.name,
+            'arm': self.arm.seed,
+            'after': after,
+            'inside': drawn.inside,
+            'model': line['model'],
+            'verdict': line['verdict'],
+            'why': line['why'],
+            'before_m': offs[0][0],
+            'after_m': offs[-1][0],
+            'worst_m': offs[-1][1],
+            'best_m': min(best, offs[0][0]),
+            'expected_m': line.get('expected_after_m'),
+            'bound_m': line.get('bound_m'),
+            'largest_m': line.get('largest_m'),
+        }
+
+    def _best(self, goal: Goal, start: Start) -> float:
+        """Return what would be left with the true causes [m]."""
+        true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
+        correction = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
+        return np.inf if isinstance(correction, Refusal) else correction.after
+
+    # Changes ---------------------------------------------------------------------------------
+
+    def changed(self, what: str) -> dict[str, Any]:
+        """Change something, and wait for the notice; return how long that took."""
+        count, limit = len(self.compensator.log), CALM if what == NOTHING else NOTICE
+        acting: tuple[dict[str, Any], ...] = ()
+        # The tracker that the model was learned with; goals are judged without its noise.
+        noise = {'effect': 'measurement_noise', 'sigma': self.right.noise}
+        if what == 'wrong model':
+            assert self.wrong is not None
+            self.model.write_text(self.wrong.text)
+            self._reload()
+        elif what == 'clock jumped':
+            acting = ({'effect': 'time_delay', 'delay': JUMP},)
+            self._late = round(JUMP * 1e9)
+        elif what == 'load changed':
+            acting = _load(self.robot)
+        self._inject(*acting, noise)
+        begun = time.monotonic()
+        if what == 'tracker lost':
+            self.analyzer.stop()
+
+        def noticed() -> bool:
+            log = self.compensator.log[count:]
+            return 'does not hold' in log or 'is lost' in log
+
+        # The arm goes to and fro meanwhile: measurements of one place tell of one place.
+        while not noticed() and time.monotonic() - begun < limit:
+            self.to(HOMES[self.name] + INSIDE * self.rng.uniform(-1.0, 1.0, self.robot.n))
+        seconds = round(time.monotonic() - begun, 2)
+        self._inject(*acting)
+        return {'robot': self.name, 'change': what, 'noticed': noticed(), 'seconds': seconds}
+
+    def restore(self) -> None:
+        self._late = 0
+        self._inject()
+        self.model.write_text(self.right.text)
+        self._reload()
+        end = time.monotonic() + SETTLED
+        self.cell.wait(lambda: time.monotonic() > end, 'what is under way')
+        self.measured.messages.clear()
+        count = len(self.deviations)
+        self.cell.wait(lambda: len(self.deviations) > count + 30, 'deviations')
+        self._reload()
+
+    def _inject(self, *more: dict[str, Any]) -> None:
+        done = self.cell.set_parameter('error_injector', 'effects', self._effects(*more))
+        assert done.successful, done.reason
+
+    def _reload(self) -> None:
+        for node in ('forward_kinematics_twin', 'compensator'):
+            answer = self.cell.trigger(f'/{node}/reload')
+            assert answer.success, answer.message
+
+
+def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
+    """Return what a torch of another weight does: it bends the shoulder and the elbow."""
+    joints = robot.joint_names
+    return (
+        {'effect': 'joint_offset', 'joint': joints[1], 'offset': 4e-4},
+        {'effect': 'joint_offset', 'joint': joints[2], 'offset': -5e-4},
+    )
+
+
+def tried(
+    arm: Arm, goals: int, models: tuple[Learned, Learned | None], known: Known
+) -> Iterator[str]:
+    """Add what becomes of an arm's goals and changes to what is known, and yield now and then so far."""
+    done = sum(not row['after'] for row in arm.of(known.rows))
+    with _cell() as (cell, folder):
+        trial = CellTrial(cell, folder, arm, models)
+        for k, drawn in enumerate(goals_of(arm, done, goals - done), done + 1):
+            known.rows.append(trial.judged(drawn, ''))
+            if k % 10 == 0:
+                yield f'{k} of {goals} goals'
+        if arm.changed:
+            yield from _changed(trial, known)
+
+
+def _changed(trial: CellTrial, known: Known) -> Iterator[str]:
+    """Change the cell in every way that is not known yet, nothing first: that too could be noticed."""
+    changes = {c['change'] for c in known.changes if c['robot'] == trial.name}
+    if changes:
+        trial.restore()  # a tracker that was never heard cannot be lost
+    for k, what in enumerate((NOTHING, *CHANGES)):
+        if what in changes:
+            continue
+        change = trial.changed(what)
+        if what != NOTHING:
+            for drawn in goals_of(trial.arm, AFTER + EACH * k, EACH):
+                known.rows.append(trial.judged(drawn, what))
+        known.changes.append(change)
+        yield str(change)
+        if what != CHANGES[-1]:
+            trial.restore()
+
+
+@contextmanager
+def _cell() -> Iterator[tuple[Cell, Path]]:
+    with TemporaryDirectory() as place, Cell(Path(place) / 'cell') as cell:
+        yield cell, Path(place)
+
+
+def other_arm(seed: int) -> str:
+    """Return what a compensator says that is given the model of another arm."""
+    names = ('ur5', 'ur10e')
+    robot, causes, rng = cell_of(names[1], seed)
+    text = learned(robot, causes, rng).text
+    with _cell() as (cell, folder):
+        model = folder / 'diagnosis.json'
+        model.write_text(text)
+        process = cell.start('compensator', robot=names[0], model=str(model), managed=False)
+        code = process.end(60.0)
+        return f'exit code {code}: {process.log.strip().splitlines()[-1]}'
+
 
 LIMITS = GoalLimits(acceleration=20.0)
 """As a compensator has them that is told nothing else."""
@@ -109,7 +411,7 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change."""
     begun = time.monotonic()
     with messages_importable():
-        from .compensator_trial import other_arm, tried
+        from .compensator import other_arm, tried
 
         known = _before(args)
 

@@ -86,8 +86,8 @@ ACTIONS: Mapping[str, Mapping[str, str]] = {
         + ''.join(
             f'trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{part}\n'
             for part in ('desired', 'actual', 'error')
-        ),
-    },
+        )
+    }
 }
 """The same of their actions."""
 NEEDED = (

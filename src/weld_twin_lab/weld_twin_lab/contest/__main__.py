@@ -7,8 +7,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from .course import read_case, write_answer
 from .entrants import entrant
-from .open_form import read_case, write_answer
 
 name, case, out = sys.argv[1:]
 write_answer(Path(out), entrant(name)(read_case(Path(case))))

@@ -18,14 +18,13 @@ from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import seal
 from ..blind.cause_sizes import Site
-from ..blind.displacement import NORMAL_90, counted, rms
+from ..blind.measures import NORMAL_90, counted, rms
 from ..blind.scoring import CONFIDENT, IN_LIBRARY, answers_of
 from ..study import Study, listed, tabled
 from . import course
-from .course import Run
+from .course import ContestAnswer, Name, Run, read_case
 from .entrants import ENTRANTS
 from .entrants.geometry import never_knows
-from .open_form import ContestAnswer, Name, read_case
 
 DENSITY, APART = 1.0 / np.sqrt(2.0 * np.pi), 1.0 / np.sqrt(np.pi)
 """Of a normal distribution of unit width: its density in the middle, and half the mean distance of two

@@ -27,10 +27,9 @@ from ..blind.recorded_motion import RATE
 from ..fleet.years import CHECKS, base, cheap_year
 from ..plant.tracker import Tracker
 from ..programs.corrections import promised_and_true, seam_driven
-from ..programs.plain_controller import evenly
+from ..programs.plain import evenly
 from ..programs.sealed_seams import BARE, CELLS, sealed_seam
-from .held import twin_for
-from .sealed import of_drawn, of_motion, on_an_arm
+from .sealed import of_drawn, of_motion, on_an_arm, twin_for
 
 YEARS = 10
 """Drawn years of a cell whose checks were diagnosed."""

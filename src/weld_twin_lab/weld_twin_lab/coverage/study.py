@@ -30,15 +30,14 @@ from weld_twin_nodes.offline.task_pool import Task
 
 from ..blind.blind_cell import at_stations
 from ..blind.cause_sizes import small_errors
-from ..blind.displacement import rms
+from ..blind.measures import rms
 from ..plant.tracker import Tracker
 from ..programs.sealed_seams import CELLS
 from ..real_arms.sources import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
 from ..study import Study, head, require_simulator, tabled
-from .held import held
 from .others import of_seam, of_touches, of_years
-from .sealed import of_case, told_shrink
+from .sealed import held, of_case, told_shrink
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
 COUNTS = (16, 24, 40)

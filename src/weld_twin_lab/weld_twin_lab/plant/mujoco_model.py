@@ -124,11 +124,7 @@ def load_from(robot: Entry, extra: list[tuple[float, np.ndarray]]) -> Load:
 
 
 def add_links(
-    spec: mujoco.MjSpec,
-    robot: Entry,
-    arm: Arm,
-    load: Load,
-    foot: mujoco.MjsBody | None = None,
+    spec: mujoco.MjSpec, robot: Entry, arm: Arm, load: Load, foot: mujoco.MjsBody | None = None
 ) -> list[mujoco.MjsBody]:
     """Add links, tool and payload on a foot or the floor, no joints; return the link bodies."""
     spec.option.gravity = list(robot.get('gravity', STANDARD_GRAVITY))

@@ -45,7 +45,7 @@ from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.recorded_motion import RATE
 from ..study import Study, engine_digest, head, require_simulator, tabled
-from .plain_controller import REST, Driven, driven, evenly, tool_pose
+from .plain import REST, Driven, driven, evenly, tool_pose
 from .sealed_seams import CELLS, MEASURING, SealedSeam, drawn_as, reader_of, sealed_seam
 
 APART = 1e-3

@@ -22,14 +22,13 @@ from weld_twin_msgs_py.programs import Context, controller_of
 from weld_twin_nodes.offline.exporting import Speeds, export
 
 from ..blind.blind_cell import BlindCell, as_recording, record
-from ..blind.deck import Lot, lots
-from ..blind.making import SealedCase, draw_case, one_arm
+from ..blind.making import Lot, SealedCase, draw_case, lots, one_arm
 from ..blind.recorded_motion import RATE, drawn_seam
 from ..plant.exponentials import Command, PlantRecording
 from ..plant.plant import run
 from ..plant.tracker import Tracker
-from . import plain_readers as readers
-from .plain_controller import Driven, evenly
+from . import plain as readers
+from .plain import Driven, evenly
 
 PULSES = (1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0)
 """Per degree, of the axes of the Yaskawa arm: of the usual size, with both signs."""

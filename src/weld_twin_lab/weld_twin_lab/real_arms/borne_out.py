@@ -30,7 +30,7 @@ from weld_twin_core.effects.plausible import plausible
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
 
-from ..blind.displacement import rms
+from ..blind.measures import rms
 from .rows import ArmRow, size
 
 TINY = 1e-12
@@ -88,10 +88,7 @@ class Borne:
 
 
 def borne_out(
-    row: ArmRow,
-    reported: Sequence[Effect],
-    claims: Sequence[Sequence[str]],
-    told: Set[str],
+    row: ArmRow, reported: Sequence[Effect], claims: Sequence[Sequence[str]], told: Set[str]
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
     Return what unseen data say of every kind against all others, and of every claim.

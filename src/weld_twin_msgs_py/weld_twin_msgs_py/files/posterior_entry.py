@@ -12,8 +12,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain, Spots
 from weld_twin_core.twin.posterior import Posterior
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.twin.directions import Directions
-from weld_twin_core.twin.discrepancy import Discrepancy
+from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict
 from weld_twin_msgs_py.messages import from_messages

@@ -22,10 +22,8 @@ from ...arrays import Array
 from ...errors import ModelError
 from ..channels import Channel
 from ..robot import Robot
-from .buffers import aligned, unbuffered
-from .half_angle import DEGREE, HalfAngle
-from .screw_regions import ROWS, Division, Region
-from .weights import on_half_angles
+from .half_angle import DEGREE, HalfAngle, aligned, unbuffered
+from .weights import ROWS, Division, Region, on_half_angles
 
 _BLOCK = 1504
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""

@@ -30,8 +30,7 @@ from ...motion.paths import default_seam
 from ...motion.planned_motion import plan
 from ...recording import JointMotion, Recording
 from ...sequences import halton
-from ...twin.directions import Directions
-from ...twin.discrepancy import Discrepancy
+from ...twin.directions import Directions, Discrepancy
 from ...twin.domain import Domain
 from ...twin.features import Features
 from ...twin.posterior import Posterior, postures_within_limits

@@ -15,8 +15,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
-from ...twin.directions import Directions
-from ...twin.discrepancy import Discrepancy
+from ...twin.directions import Directions, Discrepancy
 from ...twin.features import joints_of
 from .leftover import Rest
 

@@ -61,7 +61,7 @@ class PathSolution:
     @cached_property
     def residual(self) -> Array:
         """Return what is missing to each pose, shape (N, 2) [m, rad]."""
-        return np.stack(distances(forward(self.robot, self.q), self.poses), axis=1)
+        return np.stack(_distances(forward(self.robot, self.q), self.poses), axis=1)
 
     @property
     def condition(self) -> Array:
@@ -136,7 +136,7 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 
 def _closed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return every closed-form branch, shape (8, N, n), unwrapped and on its best turn."""
-    q = joined(_determined(robot, branches(robot, poses), poses))
+    q = _joined(_determined(robot, branches(robot, poses), poses))
     sound = np.asarray(np.isfinite(q).all(axis=-1))
     whole = np.asarray(sound.all(axis=-1))
     if whole.any():
@@ -193,7 +193,7 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     knots = _track(robot, starts, poses[index])
     if len(index) == len(poses):
         return knots
-    along = travel(robot, poses)
+    along = _travel(robot, poses)
     # Slow to load, and who corrects poses needs no path.
     from scipy.interpolate import CubicSpline
 
@@ -292,13 +292,13 @@ def reach(robot: Robot) -> float:
     return float(np.hypot(robot.a, robot.d).sum() + np.linalg.norm(robot.T_flange_tool[:3, 3]))
 
 
-def travel(robot: Robot, poses: Array) -> Array:
+def _travel(robot: Robot, poses: Array) -> Array:
     """Return a strictly increasing measure of the way along the poses, shape (N,) [rad]."""
-    moved, turned = distances(poses[1:], poses[:-1])
+    moved, turned = _distances(poses[1:], poses[:-1])
     return np.concatenate([[0.0], np.cumsum(moved / reach(robot) + turned + 1e-9)])
 
 
-def distances(first: Array, second: Array) -> tuple[Array, Array]:
+def _distances(first: Array, second: Array) -> tuple[Array, Array]:
     """Return how far poses (..., 4, 4) are apart, shape (...) each [m, rad]."""
     gap = first - second
     gap = gap.reshape(*gap.shape[:-2], 16)
@@ -308,7 +308,7 @@ def distances(first: Array, second: Array) -> tuple[Array, Array]:
     return moved, 2.0 * np.arcsin(np.minimum(turned / np.sqrt(8.0), 1.0))
 
 
-def joined(tracks: Array) -> Array:
+def _joined(tracks: Array) -> Array:
     """Return branches (K, N, n) that change places where an arm passes a singularity onto another."""
     tracks = tracks.copy()
     steps = np.abs(wrapped(np.diff(tracks, axis=1))).max(axis=-1)
@@ -331,10 +331,10 @@ def jumps(robot: Robot, q: Array, poses: Array) -> _Mask:
     if len(poses) < 2:
         return np.zeros((*q.shape[:-2], 0), dtype=bool)
     halfway = forward(robot, np.nan_to_num(0.5 * (q[..., 1:, :] + q[..., :-1, :])))
-    tool = np.diff(travel(robot, poses))
+    tool = np.diff(_travel(robot, poses))
     size, away = reach(robot), -3.0 * tool
     for ends in (poses[:-1], poses[1:]):
-        moved, turned = distances(halfway, ends)
+        moved, turned = _distances(halfway, ends)
         away = away + np.hypot(moved / size, turned)
     joints = np.abs(np.diff(q, axis=-2)).max(axis=-1)
     return np.asarray((away > 1e-3) | ((joints > LEAP) & (joints > _STEEP * tool)))

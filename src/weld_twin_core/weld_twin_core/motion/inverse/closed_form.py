@@ -85,10 +85,10 @@ def _spherical(arm: _Screws, rotation: Array, point: Array) -> Array:
     centre = np.asarray(_meeting(arm, 4, 5))
     q1 = -_angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
     # Minus: it is the arm that turns back onto the point.
-    reach = turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
+    reach = _turn(h[0], -q1, point - p[0]) - (p[1] - p[0])
     length = np.linalg.norm(reach, axis=-1)
     q3 = _two_ways(_angle_to_distance(p[2] - p[1], h[2], centre - p[2], length), 1)
-    bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], (*q3.shape, 3)))
+    bent = p[2] - p[1] + _turn(h[2], q3, np.broadcast_to(centre - p[2], (*q3.shape, 3)))
     q2 = _angle_onto(h[1], bent, reach[:, None])
     shoulder = _turn_matrix(h[0], q1)[:, None]
     arm_turn = shoulder @ _turn_matrix(h[1], q2) @ _turn_matrix(h[2], q3)
@@ -112,7 +112,7 @@ def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Arr
     """Return both (q4, q5, q6), each (2, 2, 2, N), of wrists' rotations (2, 2, N, 3, 3)."""
     last = rotation @ h6
     q5 = _two_ways(_angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
-    q4 = _angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
+    q4 = _angle_onto(h4, _turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
     before = _turn_matrix(h4, q4) @ _turn_matrix(h5, q5)
     return q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation[:, :, None])
 
@@ -128,12 +128,12 @@ def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
     q5 = _two_ways(_angle_to_height(h[1], h[4], straight, last @ h[1]), 1)
     turned = turned[:, None]
     # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
-    seen = turn(h[4], -q5, np.broadcast_to(h[1], (*q5.shape, 3)))
+    seen = _turn(h[4], -q5, np.broadcast_to(h[1], (*q5.shape, 3)))
     q6 = -_angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
     after = _turn_matrix(h[4], q5) @ _turn_matrix(h[5], q6)
     total = _rest(h[1], turned @ np.swapaxes(after, -1, -2))
-    foot = turn(h[0], -q1, point - p[0])[:, None] - (p[1] - p[0])
-    foot = foot - turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
+    foot = _turn(h[0], -q1, point - p[0])[:, None] - (p[1] - p[0])
+    foot = foot - _turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
     q2, q3, q4 = _planar(arm, foot, total)
     return _listed(q1[:, None, None], q2, q3, q4, q5[:, :, None], q6[:, :, None])
 
@@ -142,7 +142,7 @@ def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Arra
     """Return both (q2, q3, q4), each (2, 2, 2, N), of axis 4's foot from axis 2 and total turn."""
     h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
     q3 = _two_ways(_angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
-    bent = upper + turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
+    bent = upper + _turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
     q2 = _angle_onto(h[1], bent, foot[:, :, None])
     signs = h[1] @ h[2], h[1] @ h[3]
     return q2, q3, signs[1] * (total[:, :, None] - q2 - signs[0] * q3)
@@ -172,13 +172,10 @@ def _meeting(arm: _Screws, i: int, j: int) -> Array | None:
     return point if _off_axis(arm, j, point) < _EXACT else None
 
 
-_SOLVERS: dict[str, _Solver] = {
-    'spherical wrist': _spherical,
-    'three parallel': _three_parallel,
-}
+_SOLVERS: dict[str, _Solver] = {'spherical wrist': _spherical, 'three parallel': _three_parallel}
 
 
-def turn(axis: Array, angle: Array, vector: Array) -> Array:
+def _turn(axis: Array, angle: Array, vector: Array) -> Array:
     """Return vectors (..., 3) turned by angles (...) about a fixed unit axis (3,)."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = (vector @ axis)[..., None] * axis

@@ -41,14 +41,14 @@ from ..sweep import (
 from ..tolerance import Tolerance, default_tolerances, with_draws
 from ..trajectory_advice import compare_profiles, rms_over_arc
 
-POINTS = 400
+_POINTS = 400
 """Path points; the aggressive motion passes each part of the seam many times."""
-BENT_TORCH = transform(rotation_matrix([0.0, 0.6, 0.0]), np.array([0.1, 0.0, 0.35]))
+_BENT_TORCH = transform(rotation_matrix([0.0, 0.6, 0.0]), np.array([0.1, 0.0, 0.35]))
 """A torch of usual size, bent by 34 degrees, from flange to wire tip."""
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class _Case:
     """A robot, a seam and the motions on it; see `measure_case`."""
 
     robot: Robot
@@ -64,14 +64,14 @@ class Case:
     @cached_property
     def smooth(self) -> Study:
         """Return the smooth motion."""
-        return planned_study(self.robot, self.path, 'smooth', points=POINTS)
+        return planned_study(self.robot, self.path, 'smooth', points=_POINTS)
 
     @cached_property
     def aggressive(self) -> Study:
         """Return the aggressive motion."""
         return self.reversing(10)
 
-    def reversing(self, reversals: int, points: int = POINTS) -> Study:
+    def reversing(self, reversals: int, points: int = _POINTS) -> Study:
         """Return an aggressive motion that turns a number of times."""
         law = Aggressive(reversals=reversals)
         return planned_study(self.robot, self.path, law, points=points)
@@ -96,16 +96,16 @@ _POSTURES = 2000
 """Postures drawn over the joint limits; a rank correlation is then good to 0.02."""
 
 
-def _baseline(case: Case) -> dict[str, float]:
+def _baseline(case: _Case) -> dict[str, float]:
     """Measure the seam without errors against the poses that were planned."""
     law = Constant()
-    planned = plan(case.robot, case.path, law, POINTS / (case.path.length / law.speed), fit=True)
+    planned = plan(case.robot, case.path, law, _POINTS / (case.path.length / law.speed), fit=True)
     study = study_of_plan(case.robot, planned)
     off = np.linalg.norm(study.nominal.position - planned.poses[:, :3, 3], axis=1)
     return {'baseline_d_norm': off.max() / planned.length}
 
 
-def _initialization(case: Case) -> dict[str, float]:
+def _initialization(case: _Case) -> dict[str, float]:
     """Measure displacements and turns of the base, and how the deviation changes on the way."""
     study, size = case.smooth, 5e-4
     shifted = _distance(study, [BasePose(xyz=np.full(3, size / np.sqrt(3.0)))])
@@ -121,7 +121,7 @@ def _initialization(case: Case) -> dict[str, float]:
     }
 
 
-def _linearity(case: Case) -> dict[str, float]:
+def _linearity(case: _Case) -> dict[str, float]:
     """Measure how far a sweep of joint offsets departs from proportion, alone and together."""
     offsets = default_tolerances(case.robot, ('joint_offset',))
     result = [sweep(case.smooth, t, default_values(t)) for t in offsets]
@@ -138,9 +138,9 @@ def _linearity(case: Case) -> dict[str, float]:
     }
 
 
-def _leverage(case: Case) -> dict[str, float]:
+def _leverage(case: _Case) -> dict[str, float]:
     """Measure which joints matter for equal angles, with the model's tool and a bent torch."""
-    robot = case.robot.with_frames(tool=case.robot.T_flange_tool @ BENT_TORCH)
+    robot = case.robot.with_frames(tool=case.robot.T_flange_tool @ _BENT_TORCH)
     nominal = Twin(robot).poses(case.smooth.recording)
     long = replace(case.smooth, robot=robot, nominal=nominal)
     offsets = default_tolerances(case.robot, ('joint_offset',))
@@ -159,7 +159,7 @@ def _leverage(case: Case) -> dict[str, float]:
     }
 
 
-def _lengths(case: Case) -> dict[str, float]:
+def _lengths(case: _Case) -> dict[str, float]:
     """Measure link length errors: their coefficients, their proportion, their shape."""
     links = default_tolerances(case.robot, ('link_length',))
     result = local_sensitivity(case.smooth, links)
@@ -172,7 +172,7 @@ def _lengths(case: Case) -> dict[str, float]:
     }
 
 
-def _conditioning(case: Case) -> dict[str, float]:
+def _conditioning(case: _Case) -> dict[str, float]:
     """Measure whether a high condition number goes with a high gain along the seam."""
     stand = posture(case.smooth)
     condition, gain = _anywhere(case)
@@ -186,7 +186,7 @@ def _conditioning(case: Case) -> dict[str, float]:
     }
 
 
-def _anywhere(case: Case) -> tuple[Array, Array]:
+def _anywhere(case: _Case) -> tuple[Array, Array]:
     """Return condition number and gain at random postures within the joint limits."""
     robot = case.robot
     low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
@@ -197,7 +197,7 @@ def _anywhere(case: Case) -> tuple[Array, Array]:
     return gain / np.maximum(strength[:, -1], 1e-12), gain
 
 
-def _bound(case: Case) -> dict[str, float]:
+def _bound(case: _Case) -> dict[str, float]:
     """Measure the deviation by random offsets as a part of the bound |J| |dtheta|."""
     rng = np.random.default_rng(case.seed)
     gain = posture(case.smooth).amplification
@@ -220,7 +220,7 @@ _NEAR = 2
 """Path points to either side of a reversal that count as at it."""
 
 
-def _offset(case: Case) -> dict[str, float]:
+def _offset(case: _Case) -> dict[str, float]:
     """Measure constant joint offsets on both motions at the same arc length."""
     effects = [JointOffset(joint, 0.05 * DEGREE) for joint in case.robot.joint_names]
     smooth, aggressive = (_distance(s, effects) for s in (case.smooth, case.aggressive))
@@ -232,14 +232,14 @@ def _offset(case: Case) -> dict[str, float]:
     }
 
 
-def _lag(case: Case) -> dict[str, float]:
+def _lag(case: _Case) -> dict[str, float]:
     """Measure a servo lag on every joint, which does depend on the motion."""
     effects = [ServoLag(joint, _LAG) for joint in case.robot.joint_names]
     smooth, aggressive = (_distance(s, effects) for s in (case.smooth, case.aggressive))
     return {'lag_ratio': aggressive.max() / smooth.max(), 'lag_smooth_m': smooth.max()}
 
 
-def _play(case: Case) -> dict[str, float]:
+def _play(case: _Case) -> dict[str, float]:
     """Measure play of every joint: peak, rms and range on both motions."""
     effects = [Backlash(joint, _WIDTH) for joint in case.robot.joint_names]
     studies = (case.smooth, case.aggressive)
@@ -258,7 +258,7 @@ def _play(case: Case) -> dict[str, float]:
     }
 
 
-def _locality(case: Case) -> dict[str, float]:
+def _locality(case: _Case) -> dict[str, float]:
     """Measure how much of the squared deviation lies at reversals, as play and as written."""
     study = case.aggressive
     travel = np.ptp(study.recording.joints.q, axis=0)
@@ -280,7 +280,7 @@ def _locality(case: Case) -> dict[str, float]:
     }
 
 
-def _frequency(case: Case) -> dict[str, float]:
+def _frequency(case: _Case) -> dict[str, float]:
     """Measure what more reversals do to the mean and the peak, as play and as written."""
     few, many = case.reversing(2), case.reversing(20)
     out: dict[str, float] = {}
@@ -292,12 +292,12 @@ def _frequency(case: Case) -> dict[str, float]:
             f'more_reversals_peak_{label}': b.max() / a.max(),
         }
     effects = [Backlash(joint, _WIDTH, 'reversal') for joint in case.robot.joint_names]
-    finer = case.reversing(10, 2 * POINTS)
+    finer = case.reversing(10, 2 * _POINTS)
     coarse_mean = _distance(case.aggressive, effects).mean()
     return out | {'finer_mean_written': _distance(finer, effects).mean() / coarse_mean}
 
 
-def _planning(case: Case) -> dict[str, float]:
+def _planning(case: _Case) -> dict[str, float]:
     """Measure the expected deviation by time law, geometry alone and with lag and play."""
     profiles = ('constant', 's-curve', 'smooth', 'aggressive')
     out: dict[str, float] = {}
@@ -309,7 +309,7 @@ def _planning(case: Case) -> dict[str, float]:
         result = {
             r.profile: r
             for r in compare_profiles(
-                case.robot, case.path, tolerances, profiles=profiles, points=POINTS
+                case.robot, case.path, tolerances, profiles=profiles, points=_POINTS
             )
         }
         rough, fine = result['aggressive'], result['smooth']
@@ -337,7 +337,7 @@ _FACTOR = 3.0
 """Tolerances of a group are multiplied by up to this, or divided, to see whether ranks hold."""
 
 
-def _sums(case: Case) -> dict[str, float]:
+def _sums(case: _Case) -> dict[str, float]:
     """Measure the deviation by all errors over the sum of those by each source."""
     study, tolerances = case.smooth, case.tolerances
     rng = np.random.default_rng(case.seed)
@@ -359,7 +359,7 @@ def _sums(case: Case) -> dict[str, float]:
     }
 
 
-def _coupling(case: Case, draws: Array, combined: Array) -> dict[str, float]:
+def _coupling(case: _Case, draws: Array, combined: Array) -> dict[str, float]:
     """Return the part of the deviation that no sum of single errors explains."""
     study, tolerances = case.smooth, case.tolerances
     each = np.zeros((len(draws[:20]), study.samples, 3))
@@ -370,7 +370,7 @@ def _coupling(case: Case, draws: Array, combined: Array) -> dict[str, float]:
     return {'coupling': float((remaining / combined[:20].max(axis=1)).max())}
 
 
-def _drift(case: Case) -> dict[str, float]:
+def _drift(case: _Case) -> dict[str, float]:
     """Measure how the cumulative deviation grows with the path, by source and together."""
     study = case.smooth
     # Equal steps of arc length: on a time law the sum would follow the speed, not the path.
@@ -396,7 +396,7 @@ def growth_exponent(path: Array, total: Array) -> float:
     return float(np.polyfit(np.log(path[late]), np.log(total[late]), 1)[0])
 
 
-def _ranking(case: Case) -> dict[str, float]:
+def _ranking(case: _Case) -> dict[str, float]:
     """Measure the ranking by group Sobol indices, and how it stands changed tolerances."""
     tolerances = case.tolerances
     labels = tuple(_GROUPS[t.effect] for t in tolerances)
@@ -410,7 +410,7 @@ def _ranking(case: Case) -> dict[str, float]:
     return out | _stability(case) | _per_unit(case)
 
 
-def _stability(case: Case) -> dict[str, float]:
+def _stability(case: _Case) -> dict[str, float]:
     """Return how often groups keep the paper's order when their tolerances change."""
     square = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.contribution, strict=True):
@@ -425,7 +425,7 @@ def _stability(case: Case) -> dict[str, float]:
     }
 
 
-def _per_unit(case: Case) -> dict[str, float]:
+def _per_unit(case: _Case) -> dict[str, float]:
     """Return the strongest coefficient of each group per degree or per millimetre [mm]."""
     best = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.peak, strict=True):
@@ -435,7 +435,7 @@ def _per_unit(case: Case) -> dict[str, float]:
     return {f'unit_{label}': value for label, value in best.items()}
 
 
-_MEASURES: tuple[Callable[[Case], dict[str, float]], ...] = (
+_MEASURES: tuple[Callable[[_Case], dict[str, float]], ...] = (
     _baseline,
     _initialization,
     _linearity,
@@ -457,7 +457,7 @@ _MEASURES: tuple[Callable[[Case], dict[str, float]], ...] = (
 
 def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
     """Return all that the claims need of a robot on a seam by name; units as in `rules`."""
-    case, out = Case(robot, path, seed), dict[str, float]()
+    case, out = _Case(robot, path, seed), dict[str, float]()
     for measure in _MEASURES:
         out |= {key: float(value) for key, value in measure(case).items()}
     return out

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
-from ..arms import links
+from ..race import links
 from . import Peer
 
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
-from ..arms import DH_KEYS, links
+from ..race import DH_KEYS, links
 from . import Peer
 
 AXES = {'theta': 'RZ', 'd': 'PZ', 'a': 'PX', 'alpha': 'RX'}

@@ -18,7 +18,7 @@ from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ..open_form import Cause, ContestAnswer, ContestCase
+from ..course import Cause, ContestAnswer, ContestCase
 
 Learn = Callable[[Array, Array, Array], tuple[Array, Array | None]]
 """

@@ -17,7 +17,7 @@ from sklearn.preprocessing import StandardScaler
 
 from weld_twin_core.arrays import Array
 
-from ..open_form import ContestAnswer, ContestCase
+from ..course import ContestAnswer, ContestCase
 from .geometry import answer_of
 
 MOST = 300

@@ -14,8 +14,8 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ...blind.displacement import rms
-from ..open_form import ContestAnswer, ContestCase
+from ...blind.measures import rms
+from ..course import ContestAnswer, ContestCase
 from .geometry import as_causes, nominal, off
 
 TERMS = ('joint_offset', 'transmission_ripple', 'transmission_ripple', 'servo_lag', 'backlash')

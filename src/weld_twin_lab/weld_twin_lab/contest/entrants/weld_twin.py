@@ -18,7 +18,7 @@ from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.given_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
-from ..open_form import ContestAnswer, ContestCase
+from ..course import ContestAnswer, ContestCase
 
 TO_SIGMA = 1.4826
 """Standard deviation of normal noise in median absolute deviations; a few outliers do not count."""

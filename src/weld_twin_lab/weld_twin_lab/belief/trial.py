@@ -78,7 +78,7 @@ MOTIONS = ('stations', 'stations', 'seams', 'both')
 CROWDED = ('stations', 'both')
 """Motions of cases with five and six causes: stations, 40 at least, that could tell them."""
 STRATA = (1, 1, 2, 2, 2, 3)
-"""Numbers of the strata of `blind.deck`, dealt like cards: 1 to 40 times the noise."""
+"""Numbers of the strata of `blind.making`, dealt like cards: 1 to 40 times the noise."""
 ALIGN = (('base', 'tool'), ('base', 'tool'), ('base', 'tool'), ('base',), ())
 """Frames to be fitted: both in most cells, as nobody knows them."""
 NOISE = (2e-5, 8e-5)

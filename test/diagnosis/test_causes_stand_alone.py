@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.diagnosis.unseen.folds import posture_regions
-from weld_twin_core.effects.joint_coupling import JointCoupling
+from weld_twin_core.effects.gear_ratio import JointCoupling
 from weld_twin_core.effects.view import View
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 

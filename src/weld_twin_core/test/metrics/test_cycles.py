@@ -9,8 +9,7 @@ import pytest
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
-from weld_twin_core.metrics.cycles import path_cycles, pose_cycles, stops
-from weld_twin_core.metrics.performance import performance_of
+from weld_twin_core.metrics.performance import path_cycles, performance_of, pose_cycles, stops
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 TURNTABLE = Robot.from_mapping({'name': 'turntable', 'joints': [{'name': 'turn', 'a': 1.0}]})

@@ -27,7 +27,7 @@ from weld_twin_core.sensitivity import (
     tolerances_from_list,
 )
 from weld_twin_core.sensitivity.evaluate import exact_deviations
-from weld_twin_core.sensitivity.memory_draws import remembered
+from weld_twin_core.sensitivity.expansion import remembered
 from weld_twin_core.sensitivity.seam_study import outcomes
 from weld_twin_core.sensitivity.trajectory_advice import rms_over_arc
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats.qmc import Halton
 
 from weld_twin_core.arm import rotation
+from weld_twin_core.arrays import halton
 from weld_twin_core.cubics import hermite, natural_slopes, slopes_of_many
-from weld_twin_core.sequences import halton
 
 
 @pytest.fixture

@@ -8,8 +8,7 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
 from weld_twin_core.twin.posterior import Drawn
-from weld_twin_core.twin.program_accuracy import accuracy
-from weld_twin_core.twin.program_correction import Caps, correct_program
+from weld_twin_core.twin.program_correction import Caps, accuracy, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
 
 START = np.array([0.3, -1.4, 1.7, -1.9, -1.5, 0.2])

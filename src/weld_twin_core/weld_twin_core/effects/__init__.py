@@ -21,12 +21,12 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from .backlash import Backlash, LoadedPlay, Stiffening
-from .bearing_tilt import BearingTilt
+from .bearings import BearingTilt, GuideBend, GuideTilt
 from .compliance import AxisCompliance, CartesianCompliance, JointCompliance, PedestalTilt, ToolSag
 from .curves import FrameCurve, JointCurve
 from .dated import InstrumentKnock, JointSlip, SetupSettling, SetupStep, ToolSlip
 from .effect import Effect, LinearEffect, MemoryEffect
-from .gear_ratio import GearRatio, GearRatioByDirection
+from .gear_ratio import GearRatio, GearRatioByDirection, JointCoupling
 from .geometry import (
     AxisParallelism,
     BasePose,
@@ -37,9 +37,7 @@ from .geometry import (
     RootPose,
     ToolPose,
 )
-from .guide import GuideBend, GuideTilt
 from .instrument import ClockRate, Drift, MeasurementNoise, MeasurementScale, Refraction, TimeDelay
-from .joint_coupling import JointCoupling
 from .loads import HosePull, Payload
 from .quantization import Quantization
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register

@@ -22,26 +22,6 @@ AT_REST = 2e-3
 speed that the noise of encoders makes of a standing joint."""
 
 
-def _constant(view: View, index: int) -> Array:
-    """Return zero, shape (..., N): a curve over nothing has one knot, at zero."""
-    return np.zeros(np.shape(view.q[..., index]))
-
-
-def _angle(view: View, index: int) -> Array:
-    """Return the joint's position, shape (..., N) [rad or m]."""
-    return view.joint(index)
-
-
-def _direction(view: View, index: int) -> Array:
-    """Return -1 to 1, which way the joint moves; 0 at rest, shape (..., N)."""
-    return np.tanh(view.qd[..., index] / AT_REST)
-
-
-def _speed(view: View, index: int) -> Array:
-    """Return the joint's velocity, shape (..., N) [rad/s or m/s]."""
-    return view.qd[..., index]
-
-
 def load(view: View, index: int) -> Array:
     """Return the load torque of links, payload and wrench, shape (..., N) [N m or N]."""
     known = view.shift.get(('tau', index))
@@ -60,22 +40,18 @@ def _temperature(view: View, index: int) -> Array:
     return view.temperature
 
 
-def _time(view: View, index: int) -> Array:
-    """Return the time since the first stamp, shape (N,) [s]."""
-    return view.elapsed
-
-
 _Quantity = Callable[[View, int], Array]
 QUANTITIES: dict[str, _Quantity] = {
-    'constant': _constant,
-    'angle': _angle,
-    'direction': _direction,
-    'speed': _speed,
+    'constant': lambda view, index: np.zeros(np.shape(view.q[..., index])),
+    'angle': lambda view, index: view.joint(index),
+    'direction': lambda view, index: np.tanh(view.qd[..., index] / AT_REST),
+    'speed': lambda view, index: view.qd[..., index],
     'load': load,
     'temperature': _temperature,
-    'time': _time,
+    'time': lambda view, _: view.elapsed,
 }
-"""What a curve may run over; the second argument is the joint's index."""
+"""What a curve may run over at a joint, shape (..., N): zero where it is over nothing, its direction
+from -1 to 1 and 0 at rest, the time since the first stamp [s]."""
 
 
 def basis(knots: Sequence[float], x: Array) -> Array:

@@ -78,7 +78,6 @@ class Constant(Profile):
     speed: float = 0.01
 
     def law(self, length: float) -> PPoly:
-        """Return s(t)."""
         return _chained([(length / self.speed, 0.0, 0.0)], self.speed)
 
 
@@ -90,7 +89,6 @@ class Trapezoid(Profile):
     acceleration: float = 0.2
 
     def law(self, length: float) -> PPoly:
-        """Return s(t)."""
         return _chained(_trapezoid(length, self.speed, self.acceleration))
 
 
@@ -103,7 +101,6 @@ class SCurve(Profile):
     jerk: float = 2.0
 
     def law(self, length: float) -> PPoly:
-        """Return s(t)."""
         peak = self._peak(length)
         a, j = self.acceleration, self.jerk
         ramp = min(a / j, np.sqrt(peak / j))
@@ -136,7 +133,6 @@ class Smooth(Profile):
     speed: float = 0.02
 
     def law(self, length: float) -> PPoly:
-        """Return s(t)."""
         end = length / self.speed
         powers = np.array([6.0 / end**5, -15.0 / end**4, 10.0 / end**3, 0.0, 0.0, 0.0])
         return PPoly(length * powers[:, None], [0.0, end])
@@ -161,7 +157,6 @@ class Aggressive(Profile):
             raise PathError(f'aggressive profile: back must be at most 1, got {self.back!r}')
 
     def law(self, length: float) -> PPoly:
-        """Return s(t)."""
         advances = (int(self.reversals) + 1) // 2 + 1
         step = length / advances
         over = step * self.back

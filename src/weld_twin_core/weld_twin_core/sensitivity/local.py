@@ -23,7 +23,7 @@ from ..arrays import Array
 from ..effects import REGISTRY
 from ..twin.twin import Twin
 from .evaluate import exact_deviations
-from .memory_draws import MEMORY
+from .expansion import MEMORY
 from .seam_study import Study
 from .tolerance import Tolerance, places, with_draws
 

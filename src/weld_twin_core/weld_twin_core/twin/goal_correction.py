@@ -27,8 +27,7 @@ from .compensation import commandable, compensate, rms_of
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .posterior import Drawn, pose_covariances
-from .program_accuracy import accuracy
-from .program_correction import BETTER, NOTHING, too_large
+from .program_correction import BETTER, NOTHING, accuracy, too_large
 from .program_model import ProgramModel
 from .reversals import approached, is_play, just_turned, play_steps, spread
 from .twin import Twin

@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from ..arm.robot import Robot
-from ..arrays import Array, readonly
+from ..arrays import Array, halton, readonly
 from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
-from ..sequences import halton
 from .compensation import commandable
 from .directions import Directions, Discrepancy, Where
 from .domain import Domain

@@ -32,7 +32,7 @@ from weld_twin_core.twin.posterior import (
     largest_sigma,
     pose_covariances,
 )
-from weld_twin_core.twin.program_accuracy import SURE, accuracy
+from weld_twin_core.twin.program_correction import SURE, accuracy
 from weld_twin_core.twin.twin import Twin
 
 from ..belief.trial import diagnosed, drawn, recordings_of

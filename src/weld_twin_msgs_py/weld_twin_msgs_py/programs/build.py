@@ -14,7 +14,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse import CarriedArm
 from weld_twin_core.motion.programs import Move, MoveProgram, Use
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .controllers import Controller, Frame
 from .source import Notation, Number, Source

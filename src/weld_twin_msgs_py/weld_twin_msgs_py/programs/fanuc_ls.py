@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .blocks import Blocks, unclear_shift
 from .build import TURNS, WRIST, Program, Ref, Step, flags_kept

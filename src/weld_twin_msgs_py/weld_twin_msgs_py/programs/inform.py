@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .blocks import Blocks, unclear_shift
 from .build import TURNS, Program, Ref, Step, flags_kept

@@ -23,7 +23,7 @@ import numpy as np
 from weld_twin_core.arm.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from ..files.csv_text import unguarded
 from .build import Program, Ref, Step

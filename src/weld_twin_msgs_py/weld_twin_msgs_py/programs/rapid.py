@@ -26,7 +26,7 @@ import numpy as np
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .blocks import Blocks, unclear_shift
 from .build import (

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .build import Program, exchange
 from .context import Context

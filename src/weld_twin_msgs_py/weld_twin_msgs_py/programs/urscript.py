@@ -22,7 +22,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.programs.moves import Kind
+from weld_twin_core.motion.programs.travel import Kind
 
 from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest

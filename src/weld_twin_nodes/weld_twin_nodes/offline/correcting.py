@@ -22,8 +22,15 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.travel import repeated
 from weld_twin_core.recording import JointMotion, Recording, checked_temperature
 from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.program_accuracy import SURE, Accuracy, along_seams, conforms
-from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
+from weld_twin_core.twin.program_correction import (
+    SURE,
+    Accuracy,
+    Caps,
+    ProgramCorrection,
+    along_seams,
+    conforms,
+    correct_program,
+)
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior

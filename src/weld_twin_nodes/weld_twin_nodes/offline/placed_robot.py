@@ -9,7 +9,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.errors import DataError
-from weld_twin_core.metrics.cycles import measured_of, pose_cycles, stops
+from weld_twin_core.metrics.performance import measured_of, pose_cycles, stops
 from weld_twin_core.recording import Recording
 
 NUMBERS = 6

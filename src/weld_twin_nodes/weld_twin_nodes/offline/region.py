@@ -8,14 +8,13 @@ import numpy as np
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.arrays import Array
+from weld_twin_core.arrays import Array, halton
 from weld_twin_core.diagnosis.predicting.planned import JUDGED, clear_postures
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import centred, polish
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.motion.programs import travel
-from weld_twin_core.sequences import halton
 from weld_twin_core.twin.posterior import postures_within_limits
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.programs import Context, controller_of, read_program, to_moves

@@ -23,12 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arm.chain import forward
-from ...arrays import Array
+from ...arrays import Array, halton
 from ...contacts import Artefact, Contact, Contacts, Places, places
 from ...effects.effect import Effect
 from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
-from ...sequences import halton
 from ...twin.features import Features
 from ..algebra.definite import FLAT
 from ..algebra.fit import effect_precision, frame_prior

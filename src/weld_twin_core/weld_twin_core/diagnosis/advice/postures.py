@@ -12,10 +12,9 @@ import numpy as np
 
 from ...arm.clearance import Space
 from ...arm.robot import Robot
-from ...arrays import Array, spread_over
+from ...arrays import Array, halton, spread_over
 from ...errors import DataError
 from ...recording import JointMotion
-from ...sequences import halton
 from ..algebra.problem import Problem
 
 USUAL_MINUTES = 60.0

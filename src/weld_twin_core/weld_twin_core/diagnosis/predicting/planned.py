@@ -24,12 +24,11 @@ import numpy as np
 from ...arm.chain import frames
 from ...arm.mounting import rising
 from ...arm.robot import Robot
-from ...arrays import Array
+from ...arrays import Array, halton
 from ...errors import DataError
 from ...motion.paths import default_seam
 from ...motion.planned_motion import plan
 from ...recording import JointMotion, Recording
-from ...sequences import halton
 from ...twin.directions import Directions, Discrepancy
 from ...twin.domain import Domain
 from ...twin.features import Features

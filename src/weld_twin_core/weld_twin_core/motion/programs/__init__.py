@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot programs as numbers: points, moves between them, and the joint motion they make."""
 
-from .moves import Move, MoveProgram, Use
-from .travel import Piece, Travel, travel
+from .travel import Move, MoveProgram, Piece, Travel, Use, travel
 
 __all__ = ['Move', 'MoveProgram', 'Piece', 'Travel', 'Use', 'travel']

@@ -495,6 +495,12 @@ def test_stations_that_are_there_twice_are_counted(ur5, rng):
     case = SimpleNamespace(tool_fixed=False, recordings=(both,), motions=[q])
     (found,) = repeats(case)
     assert found.level == 'warning' and found.sentence.startswith('2 station(s)')
+    # Three readings of every posture: two that are equal are so by chance.
+    q = np.concatenate([np.repeat(q[10:22], 3, axis=0), q[22:26]])
+    position = np.array(seen.position)
+    position[10] = position[9]
+    thrice = replace(rejointed(run, q), measured=replace(seen, position=position))
+    assert not list(repeats(SimpleNamespace(tool_fixed=False, recordings=(thrice,), motions=[q])))
 
 
 def test_names_are_listed_as_people_do():

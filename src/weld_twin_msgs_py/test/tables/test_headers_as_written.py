@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
@@ -178,6 +179,48 @@ def test_what_was_found_and_what_is_missing_is_listed(tmp_path, head, words):
     path.write_text(head + '\n' + rows('deg', 'mm'))
     with pytest.raises(DataError, match=re.escape(words)):
         read_table(path, UR5)
+
+
+def test_one_of_several_markers_beside_each_other_is_meant(tmp_path):
+    head = [
+        *numbered('J', joined=''),
+        *(f'N1 {a} [mm]' for a in 'xyz'),
+        *(f'N2 {a}' for a in 'xyz'),
+    ]
+    path = tmp_path / 'table.csv'
+    lines = rows('deg', 'mm', 'mm', delimiter=',', comma=False).splitlines()
+    other = [
+        ','.join([*line.split(',')[:6], '1', '2', '3', *line.split(',')[9:]]) for line in lines
+    ]
+    path.write_text('\n'.join([','.join(head), *other]) + '\n')
+    recording, _ = read_table(path, UR5, TableOptions(marker='N2'))
+    np.testing.assert_allclose(recording.measured.position, POINT, atol=2e-6)
+    with pytest.raises(DataError, match='there of n1, n2: --marker takes one of them'):
+        read_table(path, UR5)
+
+
+def test_a_table_without_a_header_is_told_so_though_its_numbers_repeat(tmp_path):
+    path = tmp_path / 'table.csv'
+    lines = rows('deg', 'mm', delimiter=',', comma=False).splitlines()
+    path.write_text(''.join(f'{line},0,0,0\n' for line in lines))
+    with pytest.raises(DataError, match='numbers in its first line; put a header line above'):
+        read_table(path, UR5)
+
+
+def test_orientations_of_an_arm_that_counts_otherwise_name_the_options(tmp_path):
+    turn = Rotation.from_matrix(forward(UR5, Q)[:, :3, :3])
+    shown = np.degrees(Q) * [1, 1, -1, 1, 1, 1]
+    path = tmp_path / 'table.csv'
+    options = '--joint-signs, --joint-offsets, --coupled'
+    for names, values in (('qx,qy,qz,qw', turn.as_quat()), ('A,B,C', turn.as_euler('ZYX', True))):
+        table = np.column_stack([shown, POINT * 1e3, values])
+        head = f'J1,J2,J3,J4,J5,J6,x,y,z,{names}'
+        np.savetxt(path, table, '%.6f', ',', header=head, comments='')
+        try:
+            said = ' '.join(read_table(path, UR5).assumptions)
+        except DataError as error:
+            said = str(error)
+        assert options in said
 
 
 @pytest.mark.parametrize(

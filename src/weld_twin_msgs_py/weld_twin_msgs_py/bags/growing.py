@@ -141,7 +141,9 @@ class GrowingBag:
 
     def _refuse_existing(self) -> None:
         if self.path.exists():
-            raise DataError(f"'{self.path}' exists already and is not overwritten")
+            raise DataError(
+                f"'{self.path}' exists already and is not overwritten; give another name"
+            )
         if self.folder.exists():
             raise DataError(
                 f"'{self.folder}' is a recording that was cut short and is not overwritten; make "

@@ -113,7 +113,9 @@ class BagWriter:
 
     def _refuse_existing(self) -> None:
         if self.path.exists():
-            raise DataError(f"'{self.path}' exists already and is not overwritten")
+            raise DataError(
+                f"'{self.path}' exists already and is not overwritten; give another name"
+            )
 
     @contextmanager
     def _clear_errors(self) -> Iterator[None]:

@@ -31,7 +31,7 @@ def write_bytes(path: Path | str, content: bytes, *, overwrite: bool = False) ->
     """Write a file beside its place, then move it there; a link is followed."""
     target = followed(path)
     if target.exists() and not overwrite:
-        raise DataError(f"'{path}' exists already and is not overwritten")
+        raise DataError(f"'{path}' exists already and is not overwritten; give another name")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with _beside(target) as (scratch, file):

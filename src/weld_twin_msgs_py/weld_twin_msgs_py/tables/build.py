@@ -20,7 +20,7 @@ from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
 from .header import Columns, find_columns
 from .joint_readings import Units, counted, joint_angles, joint_units
-from .rotations import AGREES, disagreement, find_convention, rotations
+from .rotations import AGREES, COUNTING, disagreement, find_convention, rotations
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
 from .words import OWN, TableOptions, tokens
 
@@ -263,7 +263,7 @@ class _Reading:
             if off > AGREES:
                 self.said.append(
                     f'relative rotations disagree with the arm by {np.degrees(off):.3g} deg: the '
-                    'quaternion or joint columns may not be what they seem'
+                    f'quaternion or joint columns may not be what they seem; check {COUNTING}'
                 )
             return rotation
         own = [
@@ -318,7 +318,7 @@ class _Reading:
             sentence = (
                 f'positions are {typical * 1e3:.3g} mm from where robot {self.robot.name!r} would be, '
                 'with base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
-                '--angle-unit or --length-unit decide'
+                f'--angle-unit, --length-unit and {COUNTING} decide'
             )
             if self.options.joint_columns or self.options.angle_unit or self.options.length_unit:
                 raise DataError(sentence)

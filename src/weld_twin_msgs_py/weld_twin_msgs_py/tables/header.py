@@ -92,9 +92,10 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
     out.temperature = options.temperature_column or _first(names, TEMPERATURE)
     given = options.time_column
     out.date, out.time = (None, given) if given else time_columns(names)
-    _positions(remaining, options, out)
+    measured = MEASURED | set(tokens(options.marker or ''))
+    _positions(remaining, options, out, measured)
     if not options.positions_only:
-        out.rotation = options.rotation_columns or _rotation(remaining)
+        out.rotation = options.rotation_columns or _rotation(remaining, measured)
     out.sigma = options.sigma_columns or _one_group(
         remaining, 'length', SIGMA, 'sigma_columns', False
     )
@@ -254,12 +255,14 @@ def _listing(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[
     return f'; found {said}' if said else ''
 
 
-def _positions(parts: Sequence[Named], options: TableOptions, out: Columns) -> None:
+def _positions(
+    parts: Sequence[Named], options: TableOptions, out: Columns, measured: set[str]
+) -> None:
     out.position = options.position_columns or ()
     out.target = options.target_columns or ()
     out.difference = options.difference_columns or ()
     if not out.position and not (out.target and out.difference):
-        out.position = _one_group(parts, 'length', MEASURED, 'position_columns', True)
+        out.position = _one_group(parts, 'length', measured, 'position_columns', True)
     if out.position:
         return
     target = out.target or _one_group(parts, 'length', TARGET, 'target_columns', False)
@@ -283,6 +286,13 @@ def _positions(parts: Sequence[Named], options: TableOptions, out: Columns) -> N
 def _lacking(parts: Sequence[Named]) -> str:
     """Return which axes of a position are there, which are missing, and what else there is."""
     there = {part.axis: part.name for part in parts if part.kind == 'length'}
+    axes: dict[tuple[str, ...], str] = {}
+    for part in parts:
+        if part.kind == 'length' and not set(part.stem) & (TARGET | DIFFERENCE | SIGMA):
+            axes[part.stem] = axes.get(part.stem, '') + part.axis
+    tracked = [' '.join(stem) for stem, found in axes.items() if stem and set(found) == {*'xyz'}]
+    if tracked:
+        return f'; x, y and z are there of {", ".join(tracked)}: --marker takes one of them'
     missing = [axis for axis in 'xyz' if axis not in there]
     others = [part.name for part in parts if part.name not in there.values()]
     said = [f'found {", ".join(there.values())}'] if there else []
@@ -291,10 +301,10 @@ def _lacking(parts: Sequence[Named]) -> str:
     return f' ({"; ".join(said)})' if said else ''
 
 
-def _rotation(parts: Sequence[Named]) -> tuple[str, ...]:
+def _rotation(parts: Sequence[Named], measured: set[str]) -> tuple[str, ...]:
     """Return the measured quaternion or angles, nothing when the table has none."""
     for kind, axes in (('quaternion', 'xyzw'), *_ANGLES):
-        result = _one_group(parts, kind, MEASURED, 'rotation_columns', True, axes)
+        result = _one_group(parts, kind, measured, 'rotation_columns', True, axes)
         if result:
             return result
     return ()

@@ -220,15 +220,15 @@ def _joined(header: Sequence[str], below: Sequence[str]) -> list[str]:
 
 
 def _check_header(path: Path, header: list[str]) -> None:
+    if all(NUMBER.match(cell) for cell in header if cell):
+        raise DataError(
+            f"table '{path}' has numbers in its first line; put a header line above that names "
+            'the columns, such as J1,J2,J3,J4,J5,J6,x,y,z'
+        )
     counts = Counter(header)
     twice = sorted(name for name, count in counts.items() if count > 1 and name)
     if twice:
         raise DataError(f"table '{path}' has two columns called {twice[0]!r}; rename one")
-    if all(NUMBER.match(cell) for cell in header if cell):
-        raise DataError(
-            f"table '{path}' has numbers in its first line; put a header line above that names "
-            'the columns'
-        )
 
 
 def _without_comments(lines: list[str]) -> list[str]:

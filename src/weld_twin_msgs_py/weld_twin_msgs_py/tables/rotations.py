@@ -18,6 +18,8 @@ from weld_twin_core.errors import DataError
 
 from .words import EULER_ORDERS, ROTATION_VECTOR
 
+COUNTING = 'how the controller counts (--joint-signs, --joint-offsets, --coupled)'
+"""What to look at where orientations disagree with the arm, beside the columns."""
 AGREES = np.radians(3.0)
 """RMS disagreement of relative angles an arm with unknown errors may show."""
 CLEARLY = 5.0
@@ -60,8 +62,8 @@ def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
     if result[best] > AGREES:
         raise DataError(
             f'no reading of the three angles agrees with the arm (the best, {best}, is '
-            f'{np.degrees(result[best]):.3g} deg off); check the joint columns, or '
-            '--positions-only leaves orientation out'
+            f'{np.degrees(result[best]):.3g} deg off); check the joint columns and '
+            f'{COUNTING}, or --positions-only leaves orientation out'
         )
     if result[second] < CLEARLY * result[best] + ROUNDING:
         raise DataError(

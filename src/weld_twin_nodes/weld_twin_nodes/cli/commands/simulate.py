@@ -65,7 +65,9 @@ def _predict(given: Given) -> int:
     if not given.model:
         raise DataError('say with --model which effects the twin of a recording has')
     if given.table and Path(given.table).exists():
-        raise DataError(f"'{given.table}' exists already and is not overwritten")
+        raise DataError(
+            f"'{given.table}' exists already and is not overwritten; give another name"
+        )
     robot = given.load_robot()
     # Two clocks may be what the diagnosis mended.
     recording = given.read_bag(given.bag, robot, one_clock=False)

@@ -29,9 +29,10 @@ from ...effects.effect import Effect
 from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
 from ...twin.features import Features
-from ..algebra.definite import FLAT
+from ..algebra.definite import FLAT, ROUNDING
 from ..algebra.fit import effect_precision, frame_prior
 from ..algebra.motions import plain_causes
+from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from .experiment import motion_entry
 from .postures import widened
@@ -39,10 +40,6 @@ from .separation import Explanation
 
 _ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
-_SLACK = 5e-6
-"""Noise [m] of a touch at the least: no ball rests better, though few touches may leave nothing."""
-_DETERMINED = 1e-14
-"""Share of the strongest direction below which information is rounding."""
 _TRIED = 160
 """Postures that are started from at every place; a third of them reach it within the limits."""
 _ENOUGH = 40
@@ -89,7 +86,7 @@ class Design:
         problem = replace(problem, align=problem.align & {'tool'})
         model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
         taken = [unknown for unknown in problem.touched if unknown is not None]
-        sigma = max(scale.position, _SLACK)
+        sigma = max(scale.position, MICROMETRE)
         prior = np.concatenate([frame_prior(problem, model)[0], effect_precision(model)])
         freedom = [unknown.freedom for unknown in taken]
         starts = prior.size + np.cumsum([0, *freedom])
@@ -197,7 +194,7 @@ def _root(information: Array) -> Array:
     """Return a root of the inverse of a normal matrix."""
     size = np.sqrt(np.diag(information))
     strength, ways = np.linalg.eigh(information / np.outer(size, size))
-    strength = np.maximum(strength, _DETERMINED * strength[-1])
+    strength = np.maximum(strength, ROUNDING * strength[-1])
     return np.asarray(ways / np.sqrt(strength) / size[:, None])
 
 

@@ -31,6 +31,11 @@ REPEATED = 1e-11
 """Added to a diagonal of ones, so that columns that repeat others do no harm; far above rounding."""
 FLAT = 1e-9
 """A direction, or a column once others are projected out, of less than this share carries nothing."""
+SLIGHT = 1e-6
+"""Share of a number that decides nothing, though it is far above rounding."""
+HIDDEN = 0.05
+"""Part of what an error does to the tool that fitted frames must leave of it for it to be told from
+them: formulas are a few per cent off real arms, so that less says nothing of the error."""
 
 
 def inverted(matrix: Array) -> Array:

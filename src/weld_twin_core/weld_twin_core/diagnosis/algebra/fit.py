@@ -23,7 +23,7 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.plausible import spreads
 from .columns import Columns, designed
-from .definite import EMPTY, FLAT, REPEATED, ROUNDING, factored, unit_diagonal
+from .definite import EMPTY, FLAT, REPEATED, ROUNDING, SLIGHT, factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
 from .noise_floor import NANOMETRE
 from .problem import Model, Problem, Scale
@@ -32,8 +32,6 @@ FRAME_SHIFT = 0.02
 """Spread [m] of a frame's origin about where the alignment, which starts within 2 cm, put it."""
 FRAME_TURN = 0.05
 """Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
-STRAIGHT = 1e-6
-"""Share of what is left by which a step may miss what its equations predict, for it to be the last."""
 STEADY = 1e-4
 """The same share up to which columns serve for the next step, too: they have hardly turned."""
 DAMPING, DAMPED = FLAT, 1e6
@@ -49,8 +47,8 @@ STRAY = 20.0
 missing effect does to some postures widens the deviation that it is measured in."""
 STRAYS, STRAYS_TOGETHER = 0.1, 2
 """Share of the samples that may be strays, and how many in a row: more are a set-up that moved."""
-LEAST_TURN = 0.5
-"""Least noise of orientation per noise of position [rad/m]: no probe is wider than some metres. Exact
+PROBE = 2.0
+"""Most noise of position per noise of orientation [m/rad]: no probe is wider than some metres. Exact
 orientations, as a simulated cell gives, would otherwise drown every position."""
 
 STRAINED = 1.0
@@ -172,13 +170,13 @@ def _descended(
             there = here.stepped(step)
             if there.cost <= here.cost:
                 break
-            there, damping = None, max(damping * 100.0, 1e-6)
+            there, damping = None, max(damping * 100.0, SLIGHT)
         if there is None:
             break
         gain = (here.cost - there.cost) / max(here.cost, EMPTY)
         missed = abs(there.cost - expected)
-        here, damping = there, max(damping * 0.01, DAMPING)
-        if gain < tolerance or missed < STRAIGHT * there.cost:
+        here, damping = there, max(damping / 100.0, DAMPING)
+        if gain < tolerance or missed < SLIGHT * there.cost:
             break
         if missed > STEADY * there.cost:
             columns = here.columns()
@@ -287,7 +285,7 @@ def robust_scale(
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
     sigma = max(sigma, NANOMETRE)
-    sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
+    sigma_turn = max(sigma_turn, sigma / PROBE)
     weights = []
     for part, own in zip(residuals, given, strict=True):
         off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3) / sigma

@@ -9,8 +9,11 @@ from typing import TypeVar
 import numpy as np
 
 from ...arrays import Array
+from .definite import SLIGHT
 
 Row = TypeVar('Row', bound=np.generic)
+ENOUGH = 12
+"""Samples from which on they tell how wide they spread: a median is then good to a quarter."""
 NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size: 1 / 0.6745."""
 
@@ -35,7 +38,7 @@ def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, 
 def _correlation_time(part: Array) -> float:
     """Return 1 + 2 sum of autocorrelations until a pair of them is not positive."""
     m = part.shape[0]
-    if m < 8:
+    if m < ENOUGH:
         return 1.0
     size = 1 << (2 * m - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(part, size, axis=0)) ** 2
@@ -66,12 +69,8 @@ def robust_spread(values: Array) -> float:
     return NORMAL * float(np.median(np.abs(values)))
 
 
-NOT_MEASURED = 1e-6
-"""Share of the largest size below which a coordinate is taken for one that was never measured."""
-
-
 def measured_axes(part: Array) -> Array:
     """Return the coordinates (k, M) of (3, M) that were measured: exact zeros are no small noise."""
     size = np.abs(part).max(axis=1, initial=0.0)
-    live = size > NOT_MEASURED * size.max(initial=0.0)
+    live = size > SLIGHT * size.max(initial=0.0)
     return part[live] if live.any() else part

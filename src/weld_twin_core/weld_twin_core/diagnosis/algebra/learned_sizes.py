@@ -20,13 +20,11 @@ from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...errors import DataError
-from .definite import FLAT, ROUNDING, solved
+from .definite import FLAT, ROUNDING, SLIGHT, solved
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
-LEAST_VARIANCE = 1e-8
-"""Least variance of a group, in typical sizes: a ten thousandth of the usual error is none."""
-JITTER = (ROUNDING, FLAT, 1e-6, 1e-3, 1.0)
+JITTER = (ROUNDING, FLAT, SLIGHT, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
 
 
@@ -66,10 +64,10 @@ def learned_precision(
         mean, spread = _solved(normal, right, noise, precision, room)
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
         left = rss - 2.0 * right @ mean + mean @ normal @ mean
-        noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
-        share = np.maximum(np.bincount(members, determined[tied], count), 1e-3)
+        noise = max(left / max(rows - determined.sum(), 1.0), SLIGHT)
+        share = np.maximum(np.bincount(members, determined[tied], count), SLIGHT)
         learned = np.bincount(members, mean[tied] ** 2, count) / share
-        learned = np.minimum(np.maximum(learned, LEAST_VARIANCE), most)
+        learned = np.minimum(np.maximum(learned, FLAT), most)
         variance = np.where(learned_of, learned, variance)
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.

@@ -25,7 +25,7 @@ from ...effects.view import View
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
-from .definite import EMPTY, outside, share_outside, span_of
+from .definite import EMPTY, SLIGHT, outside, share_outside, span_of
 from .problem import Site
 
 STILL = 0.04
@@ -41,8 +41,6 @@ POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
 LEVER = 0.5
 """Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
-SAME = 1e-6
-"""Share of an error that may lie outside what another one spans; far above rounding."""
 SEED = 1
 """Of the postures: any generic set gives the same answer."""
 
@@ -160,11 +158,11 @@ def same_error(
     a, b = columns(robot, one), columns(robot, other)
     if align:
         span = _frames(robot, align)
-        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
+        if min(share_outside(rows, span).min() for rows in (a, b)) < SLIGHT:
             return False  # A frame is what they are.
         a, b = (outside(rows, span) for rows in (a, b))
     within = (
-        rows.any(axis=1).all() and (share_outside(rows, span_of(others)) < SAME).all()
+        rows.any(axis=1).all() and (share_outside(rows, span_of(others)) < SLIGHT).all()
         for rows, others in ((a, b), (b, a))
     )
     return bool(all(within) if both else any(within))
@@ -203,10 +201,10 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
     singles = [e for e in _constants(robot) if e.fit.coordinates().size == 1]
     singles = [e for e in singles if e.traits.set_at_controller <= (e.name not in exclude)]
     rows = np.concatenate([np.zeros((0, span.shape[1])), *(columns(robot, e) for e in singles)])
-    shown = share_outside(rows, span) > SAME
+    shown = share_outside(rows, span) > SLIGHT
     rows = outside(rows, span)
     unit = rows / np.maximum(np.linalg.norm(rows, axis=1), EMPTY)[:, None]
-    same = np.outer(shown, shown) & (np.abs(unit @ unit.T) > 1.0 - SAME**2)
+    same = np.outer(shown, shown) & (np.abs(unit @ unit.T) > 1.0 - SLIGHT**2)
     can_be_set = np.array([e.traits.set_at_controller for e in singles], dtype=bool)
     found = same[:, can_be_set].any(axis=1) & ~can_be_set
     return frozenset(Site.of(singles[k]) for k in np.flatnonzero(found))

@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from .independent_rows import measured_axes, robust_spread
+from .independent_rows import ENOUGH, measured_axes, robust_spread
 from .problem import Problem
 
 NANOMETRE = 1e-9
 """Least error [m] divided by, far below any instrument."""
+MICROMETRE = 1e-6
+"""Least error [m] that any instrument sees."""
 THIRD = 20.0
 """Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
 SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""
-ENOUGH = 12
-"""Samples, or repeats, from which on a median tells the noise to a quarter."""
 WIDEST = 3.5e-4
 """Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's. Trackers
 have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to show by

@@ -24,11 +24,10 @@ from ...pose_noise import Common
 from ...recording import Counted, Recording
 from ...twin.features import Features, Remembered
 from ...twin.twin import Twin
+from .definite import ROUNDING
 from .independent_rows import by_sample
 
 FRAMES = ('base', 'tool')
-LEAST_WEIGHT = 1e-12
-"""Weight of a sample that counts as none; keeps it from a division by zero."""
 ROWS = 9000
 """Rows on which effects and changes are looked for, and what is left open: more show the same."""
 PLACES = 3
@@ -287,7 +286,7 @@ class Problem:
         for root, part, weight in pairs:
             unit = np.full(part.shape[1], scale.position)
             unit[3:] = scale.orientation
-            rows = part * unit / np.sqrt(np.maximum(weight, LEAST_WEIGHT))[:, None]
+            rows = part * unit / np.sqrt(np.maximum(weight, ROUNDING))[:, None]
             out.append(rows if root is None else np.linalg.solve(root, rows[..., None])[..., 0])
         return out
 

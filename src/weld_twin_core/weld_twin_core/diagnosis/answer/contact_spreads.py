@@ -11,14 +11,11 @@ from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
 from ..algebra.definite import outside, span_of
 from ..algebra.motions import plain_causes
+from ..algebra.open_directions import VISIBLE
 from ..algebra.problem import Model, Problem
 from ..evidence import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen
-
-BASE = (5e-3, 5e-3)
-"""A shift [m] and a turn [rad] of the base that contacts at known places should show: an arm put
-back on its feet is off by that much."""
 
 
 def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
@@ -68,7 +65,7 @@ def _base_hidden(result: Search) -> tuple[str, ...]:
         for k, maker in enumerate(problem.features(model))
     ]
     size = np.linalg.norm(problem.whitened(rows, result.scale), axis=1)
-    shown = size * np.repeat(BASE, 3) >= 1.0
+    shown = size * np.repeat(VISIBLE, 3) >= 1.0
     words = [f'the base along {axis}' for axis in 'xyz']
     words += [f'a turn of the base about {axis}' for axis in 'xyz']
     return tuple(text for text, seen in zip(words, shown, strict=True) if not seen)

@@ -25,7 +25,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance, designed
-from ..algebra.definite import EMPTY
+from ..algebra.definite import EMPTY, SLIGHT
 from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
@@ -33,10 +33,8 @@ from ..algebra.starts import profile
 from ..evidence import Search, Verdict
 from ..levels.causes import covering
 from ..result import Cause, Found, Site
+from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen
-
-_LEAST_SHARE = 1e-3
-"""Share of the rows that counts as independent at the least; keeps a division finite."""
 
 
 def named_effects(
@@ -49,7 +47,7 @@ def named_effects(
     named.sort(key=lambda pair: -squares[pair[0]])
     if not named:
         return (), replace(verdict, sets=()), tuple(replace(c, effect=None) for c in causes)
-    share = max(result.effective(result.small) / result.small.residual.size, _LEAST_SHARE)
+    share = max(result.effective(result.small) / result.small.residual.size, SLIGHT)
     fitted = result.problem, model, result.scale, result.precision
     errors = standard_errors(*fitted, share, posterior, verdict.sets)
     effects = tuple(Found(model.found[member], errors[member]) for member, _ in named)
@@ -168,8 +166,6 @@ _DRAWS = 1000
 """Enough for the ends of an interval to be good to a few per cent of its width."""
 _SEED = 1
 """Of the draws: the same recordings give the same intervals."""
-_ENDS = (0.05, 0.95)
-"""Quantiles between which nine draws of ten lie."""
 HALF_DIGIT = 5e-4
 """Half of the last digit of a share as pages tell it, 0.1 %: no interval is finer."""
 
@@ -195,7 +191,7 @@ def with_intervals(
 
 
 def _with_interval(cause: Cause, tries: Array) -> Cause:
-    low, high = np.quantile(tries, _ENDS)
+    low, high = np.quantile(tries, ((1.0 - COVERED) / 2.0, (1.0 + COVERED) / 2.0))
     low, high = min(low, cause.share) - HALF_DIGIT, max(high, cause.share) + HALF_DIGIT
     return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
-from ..algebra.definite import ROUNDING
+from ..algebra.definite import ROUNDING, SLIGHT
 from ..algebra.fit import FRAME_SHIFT, fit, robust_scale
 from ..algebra.problem import Model, Problem
 
@@ -45,8 +45,6 @@ LEVER = 0.1
 """Metres that a radian counts as, where turns and positions are weighed together."""
 FLOOR = 1e-5
 """Gap [m] below which a sample gains no more weight."""
-TIE = 1e-6
-"""Pull towards the given frames, relative; decides only what the data leave open."""
 TOGETHER = 16
 """Trials that are taken at once: enough to share the steps, few enough for the processor's cache."""
 REACHES = (0.1, 0.4)
@@ -140,10 +138,10 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
             left = track.position - track.point @ axes.T - turn @ start[:3, 3] - base[:3, 3]
             normal += np.einsum('m,mki,mkj', weight, turn, turn)
             right += np.einsum('m,mki,mk', weight, turn, left)
-        tie = max(TIE * np.linalg.norm(moment), ROUNDING)
+        tie = max(SLIGHT * np.linalg.norm(moment), ROUNDING)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
         total = sum(float(weight.sum()) for weight in weights)
-        vector = start[:3, 3] + np.linalg.solve(normal + TIE * total * np.eye(3), right)
+        vector = start[:3, 3] + np.linalg.solve(normal + SLIGHT * total * np.eye(3), right)
         tool = transform(rotation, vector)
         pairs = zip(tracks, model.bases, strict=True)
         weights = [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
@@ -296,7 +294,7 @@ def _based(track: Track, start: Bases, turn: Array, vectors: Array, rounds: int)
         if turns is not None:
             moment = moment + (weight @ turns).reshape(moment.shape)
         size = np.linalg.norm(moment, axis=(-2, -1))[..., None, None]
-        rotation = nearest_rotation(moment + TIE * size * start.rotation)
+        rotation = nearest_rotation(moment + SLIGHT * size * start.rotation)
         base = Bases(rotation, middle - (rotation @ centre[..., None])[..., 0])
         weight = 1.0 / np.maximum(_gaps(track, base, turn, vectors, reached), FLOOR)
     return base
@@ -336,7 +334,7 @@ def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Ar
         normal = normal + whole[..., None, None] * (np.eye(3) - back @ mean)
         right = right + whole[..., None] * (pull - (back @ middle[..., None])[..., 0])
         total = total + whole
-    system = normal + TIE * np.asarray(total)[..., None, None] * np.eye(3)
+    system = normal + SLIGHT * np.asarray(total)[..., None, None] * np.eye(3)
     return np.asarray(start + np.linalg.solve(system, np.asarray(right)[..., None])[..., 0])
 
 

@@ -24,16 +24,13 @@ from ..algebra.definite import EMPTY
 from ..beliefs import Beliefs
 from ..evidence import Row, Search, Verdict, marginal
 from ..result import Cause, Contributions, Shares, Site
-from ..unseen.folds import jackknife
+from ..unseen.folds import COVERED, jackknife, student
 from ..unseen.unseen_stretches import Unseen
 from .curved import Curved
 from .free_form import FreeForm, Part
 
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
-STUDENT = 1.86
-"""Student's t for 90 % and the 8 folds."""
-
 SHARED = 0.002
 """Share by which an interval reaches further on each side than its folds show: they share the
 noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered; of 167 others
@@ -106,7 +103,8 @@ def _cause(
 
 
 def _sized(cause: Cause, share: float, error: float) -> Cause:
-    low, high = max(share - STUDENT * error, 0.0), min(share + STUDENT * error, 1.0)
+    reach = student(COVERED) * error
+    low, high = max(share - reach, 0.0), min(share + reach, 1.0)
     return replace(cause, share=share, share_ci90=(float(low), float(high)))
 
 

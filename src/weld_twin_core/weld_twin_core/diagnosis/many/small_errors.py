@@ -25,7 +25,7 @@ from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage
 from ...twin.features import Features, joints_of
 from ..algebra.columns import Maker, Piece, designed
-from ..algebra.definite import FLAT, outside, share_outside, span_of
+from ..algebra.definite import FLAT, HIDDEN, outside, share_outside, span_of
 from ..algebra.fit import (
     Fit,
     coordinates,
@@ -42,9 +42,6 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.unseen_stretches import Unseen
 
-SEEN = 0.05
-"""Part of an error's effect on the tool that fitted frames must leave of it: formulas are a few
-per cent off real arms, so that less than this says nothing of the error."""
 LINES = 40
 """Lines at the most; the weakest of so many is far below what decides anything."""
 
@@ -130,7 +127,7 @@ def _apart_from_frames(
     out, span = [], span_of(frames)
     for effect in effects:
         own = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
-        if (share_outside(own, span) > SEEN).any():
+        if (share_outside(own, span) > HIDDEN).any():
             out.append(effect)
     return out
 

@@ -37,9 +37,9 @@ from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import EMPTY, FLAT, inverse_of, root_of
-from ..algebra.fit import LEAST_NOISE, LEAST_TURN, Fit
+from ..algebra.fit import LEAST_NOISE, PROBE, Fit
 from ..algebra.independent_rows import effective_share
-from ..algebra.noise_floor import NoiseFloor
+from ..algebra.noise_floor import MICROMETRE, NoiseFloor
 from ..algebra.open_directions import AXES, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..result import Shrink
@@ -49,10 +49,8 @@ from . import plausible_arm
 from .leftover import Predicted, known_noise, leftover
 from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
-POSTURES = 200
+POSTURES = 100
 """Enough for a median to be good to some per cent."""
-LEAST = 1e-6
-"""Least noise of a position per axis [m]: no instrument is better, and some digits must be left."""
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 MOST = 3
@@ -62,7 +60,7 @@ Rooted = Callable[[Products], tuple[Array, Array]]
 USUAL = 0.5
 """Standard deviation of the logarithm of a dispersion before the data: a judgement, models of real
 arms are seldom off by twice what they say."""
-FACTORS = np.exp(np.linspace(-2.0, 2.0, 81))
+FACTORS = np.exp(np.linspace(-2.0, 2.0, 100))
 """Dispersions that are weighed: four standard deviations to either side."""
 
 
@@ -82,7 +80,7 @@ def allowed(
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
     """
     recordings = problem.recordings
-    jumps = sum(shown(f, max(scale.position, LEAST)) for f in problem.features(model))
+    jumps = sum(shown(f, max(scale.position, MICROMETRE)) for f in problem.features(model))
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
     what = _directions(problem, model)
     prior = _prior(what, model)
@@ -126,8 +124,8 @@ def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
 def _noisy(scale: Scale) -> Scale:
     return replace(
         scale,
-        position=max(scale.position, LEAST),
-        orientation=max(scale.orientation, LEAST_TURN * LEAST),
+        position=max(scale.position, MICROMETRE),
+        orientation=max(scale.orientation, MICROMETRE / PROBE),
     )
 
 

@@ -24,13 +24,13 @@ from ...arrays import Array, spread_over
 from ...twin.reversals import just_turned
 from ..algebra.definite import EMPTY, REPEATED, unit_diagonal
 from ..algebra.fit import trusted
+from ..algebra.independent_rows import ENOUGH
 from ..algebra.noise_floor import NANOMETRE, NoiseFloor
 from ..algebra.problem import Problem
+from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen
-from .sizes import Products
+from .sizes import SIZES, Products
 
-HOLD = 0.9
-"""Share of unseen postures that their regions shall hold."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 """Shares of what is left over that may come from the gears; never all, for tools shake too."""
 ROUGH = 0.5
@@ -40,7 +40,7 @@ NEIGHBOURS = (2, 8, 32, 128)
 """Samples that are looked at together: two show what changes fast, a hundred a tenth of the noise."""
 AGREED = 2.5
 """Standard errors from which neighbours agree by no chance, which gets so far once in twenty times."""
-IN_COMMON = np.logspace(-8.0, 0.0, 161)
+IN_COMMON = np.geomspace(SIZES[0] ** 2, 1.0, 100)
 """Parts of what is left that neighbours may have in common. Before the data every decade is as likely as
 every other, down to that of a ten-thousandth of the size, which is none (`sizes.SIZES`)."""
 MOST = 800
@@ -54,8 +54,6 @@ CERTAIN = 5.0
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
 
-FEW = 12
-"""Samples after turns of a joint below which they tell nothing of what is left there."""
 PEAK = np.sqrt(3)
 """Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
 STRAYED = 1.5
@@ -283,7 +281,7 @@ def _at_turns(problem: Problem, predicted: Predicted, lost: Array) -> Array:
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
         out[i] = lost[i] / np.sqrt(3)
-        if min(here.size, beside.size) < FEW:
+        if min(here.size, beside.size) < ENOUGH:
             continue
         doubt = CLEAR * np.sqrt(here.var() / here.size + beside.var() / beside.size)
         more = here.mean() - beside.mean()
@@ -430,9 +428,9 @@ def _neighbours(
 
 def _size(errors: Array, moments: Array, shape: Array) -> float:
     """Return the factor of a shape's root that makes regions hold as many errors as they shall."""
-    limit = float(chdtri(3, 1.0 - HOLD))
+    limit = float(chdtri(3, 1.0 - COVERED))
     # Of few errors the largest say more of those to come than their count: conformal level.
-    wanted = min(HOLD * (1.0 + 1.0 / len(errors)), 1.0)
+    wanted = min(COVERED * (1.0 + 1.0 / len(errors)), 1.0)
 
     # On the axes in which both are diagonal, every size asked for costs a division.
     root = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(shape, moments.shape)))

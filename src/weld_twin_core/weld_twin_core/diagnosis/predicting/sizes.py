@@ -32,7 +32,7 @@ from scipy.linalg.blas import dgemm, dger
 from scipy.linalg.lapack import dtrtrs
 
 from ...arrays import Array
-from ..algebra.definite import EMPTY, ROUNDING, inverse_of, root_of
+from ..algebra.definite import EMPTY, HIDDEN, ROUNDING, inverse_of, root_of
 from ..algebra.fit import NOISE_TRUST
 
 SIZES = np.array([0.0001, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
@@ -43,8 +43,6 @@ BELIEF = np.array([0.1, 0.1, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
 of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
 POOLED, OWN = 3.0, 4.0
 """So many coordinates' worth of belief in that, and in what all families together show, for each."""
-OPEN = 0.05
-"""Part of what a coordinate does that fitted frames do not, up to which it is hidden: a judgement."""
 USUAL = 0.3
 """Size from which on an error is one that machines usually have."""
 SWEEPS, LEARNING = 100, 20
@@ -145,7 +143,7 @@ def with_prior(information: Array) -> Array:
     """Return the data's information with a prior of unit width added, in its place."""
     diagonal = np.einsum('ii->i', information)
     # Each by its own rounding: that of the largest entry would outweigh the prior of the others.
-    diagonal *= 1.0 + 1e-14
+    diagonal *= 1.0 + ROUNDING
     diagonal += 1.0
     return information
 
@@ -157,7 +155,7 @@ def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     square = np.einsum('ij,ij->i', columns, columns)
     own = square if rows.moved is None else rows.moved**2
     remaining = square - ((columns @ basis.T) ** 2).sum(axis=1)
-    return np.asarray(~frames & (remaining <= OPEN**2 * own))
+    return np.asarray(~frames & (remaining <= HIDDEN**2 * own))
 
 
 @dataclass

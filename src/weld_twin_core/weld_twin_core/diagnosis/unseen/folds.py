@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from ...arrays import Array
 from ..algebra.definite import EMPTY
@@ -22,6 +23,8 @@ from ..algebra.problem import PLACES, Problem
 
 STRETCHES = 8
 """Folds in time: enough for a standard error, few enough that each shows much."""
+COVERED = 0.9
+"""Share of what is told with an interval that it shall hold."""
 MOST_IN_ONE = 0.5
 """Share of a recording in one region from which on the others do not show its base."""
 
@@ -74,6 +77,11 @@ def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
             out[at : at + m] = np.arange(m) * count // m
         at += m
     return np.asarray(out)
+
+
+def student(share: float) -> float:
+    """Return between how many standard errors to either side a share lies, by the folds' spread."""
+    return float(stdtrit(STRETCHES - 1, (1.0 + share) / 2.0))
 
 
 class Gain(NamedTuple):

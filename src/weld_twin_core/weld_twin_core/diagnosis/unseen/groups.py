@@ -28,6 +28,7 @@ from ...effects.effect import Effect
 from ...twin.features import Features
 from ...twin.memory import Picker
 from ..algebra.definite import FLAT, ROUNDING
+from ..algebra.independent_rows import ENOUGH
 from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
@@ -37,8 +38,6 @@ FINE, LEAST_FINE = 3 * KNOTS['angle'], 400
 LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
 """Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
 temperature [K]. Curves over less are straight lines, and told from nothing."""
-LEAST_PUSHED = 8
-"""Samples of a recording up to which they tell no acceleration."""
 WANDERS = 16
 """Times over a recording at which a lost motion may have another size: a few seconds apart."""
 LOOSE = 100.0
@@ -182,7 +181,7 @@ def _of_joints(problem: Problem, features: list[Features], *, wandering: bool) -
         return
     for index, joint in enumerate(features[0].twin.robot.joint_names):
         columns = [maker.column(('q', index)) for maker in features]
-        if max(m.at.size for m in features) > LEAST_PUSHED:
+        if max(m.at.size for m in features) >= ENOUGH:
             pushes = (_push(maker, index) for maker in features)
             each = zip(columns, pushes, strict=True)
             yield joint, 'acceleration', [column[None] * push for column, push in each], ()
@@ -345,7 +344,7 @@ def _grown(maker: Features) -> Array:
 
 def _push(maker: Features, index: int) -> Array:
     """Return how a joint is accelerated (M,); none in a recording of too few samples to tell."""
-    if maker.at.size <= LEAST_PUSHED:
+    if maker.at.size < ENOUGH:
         return np.zeros(maker.at.size)
     return np.gradient(maker.view.qd[:, index], maker.view.t)
 

@@ -20,11 +20,11 @@ from ..beliefs import Beliefs
 from ..evidence import Search
 from ..frames.aligned import by_place, posed
 from ..result import Shrink
-from .folds import STRETCHES, jackknife, posture_regions
+from .folds import STRETCHES, jackknife, posture_regions, student
 from .unseen_stretches import Unseen
 
-STUDENT = 2.36
-"""Student's t for 95 % and the 8 folds."""
+WITHIN = 0.95
+"""Share of such ratios that the interval told of one shall hold."""
 FEWEST = 3
 """Folds from which on they show a spread at all."""
 STRAYS, MANY_FOR_ONE = 3, 20
@@ -229,5 +229,5 @@ def ratio_interval(
     if elsewhere is not None:
         apart = np.log(max(elsewhere, EMPTY) / max(ratio, EMPTY))
         variance += min(abs(float(apart)), farthest) ** 2
-    reach = STUDENT * np.sqrt(variance)
+    reach = student(WITHIN) * np.sqrt(variance)
     return ratio, (ratio * float(np.exp(-reach)), ratio * float(np.exp(reach)))

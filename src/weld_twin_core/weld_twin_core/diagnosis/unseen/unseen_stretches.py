@@ -26,15 +26,21 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
-from ..algebra.definite import EMPTY, FLAT, REPEATED, Index, factored, inverted, unit_diagonal
+from ..algebra.definite import (
+    EMPTY,
+    FLAT,
+    REPEATED,
+    ROUNDING,
+    Index,
+    factored,
+    inverted,
+    unit_diagonal,
+)
 from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import chosen_anew
 from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
-ROUNDED = 1e-13
-"""Share of a column's sum of squares that is rounding once a stretch is taken off it: some hundred
-times what one difference of doubles loses."""
 RIDGES = (1e-2, 1.0, 1e2, 1e4)
 """Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
 MANY = 200
@@ -281,7 +287,7 @@ class Unseen:
             some = np.ix_(index, index)
             total, own = total[some], own if many else own[some]
         remaining = total - own
-        remaining[np.diag_indices_from(remaining)] += ROUNDED * np.diag(total)
+        remaining[np.diag_indices_from(remaining)] += ROUNDING * np.diag(total)
         return np.asarray(remaining)
 
     def _right(self, b: int, mix: Array, kept: Iterable[int]) -> Array:
@@ -312,7 +318,7 @@ class Unseen:
             remaining = self._system(b, every)
             system, size = unit_diagonal(remaining.copy(), REPEATED)
             step = factored(system)(self._right(b, mix, range(len(self.parts))) / size) / size
-            more = np.maximum(_spread(remaining) - whole, ROUNDED * whole)
+            more = np.maximum(_spread(remaining) - whole, ROUNDING * whole)
             ratios[b] = step**2 / np.maximum(more, EMPTY)
         reported = np.minimum(ratios, MOST_STEPS).mean(axis=0)
         out = np.array([reported[part].max(initial=0.0) for part in self.parts])

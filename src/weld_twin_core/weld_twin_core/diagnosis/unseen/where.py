@@ -15,6 +15,7 @@ import numpy as np
 
 from ..algebra.definite import EMPTY, ROUNDING
 from ..algebra.fit import Fit, trusted
+from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
 from ..evidence import Search
@@ -127,7 +128,7 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
         if not recording.joints.static and error.shape[0] > 2:
             travel = np.gradient(poses.position, maker.at, axis=0)
         size = np.linalg.norm(travel, axis=1, keepdims=True)
-        along = np.where(size > 1e-6, travel / np.maximum(size, ROUNDING), 0.0)
+        along = np.where(size > MICROMETRE, travel / np.maximum(size, ROUNDING), 0.0)
         normal = normal - along * (normal * along).sum(axis=1, keepdims=True)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), ROUNDING)
         a, c = (error * along).sum(axis=1)[kept], (error * normal).sum(axis=1)[kept]

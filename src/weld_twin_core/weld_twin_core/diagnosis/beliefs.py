@@ -6,6 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+SHORTLIST = 6
+"""Candidates that are tried in full at every step, where a quick ranking may mislead; of groups without
+a formula the right one was within four."""
+CAUSES = 6
+"""Causes of a cell at the most: of more at once nothing simple can be said."""
+
 
 @dataclass(frozen=True)
 class Beliefs:
@@ -68,9 +74,6 @@ class Beliefs:
     better: float = 0.95
     """RMS on unseen stations, as a share of that of the few, that the many must stay below. A
     judgement."""
-    tied_from: int = 3
-    """Coordinates of one kind from which on they share a learned size: a variance learned from
-    two numbers says nothing."""
     wave_range: float = 1.0
     """Travel [rad] of a joint from which on its waves differ from their neighbours' orders: over
     less than a sixth of a turn, orders that differ by six look alike."""

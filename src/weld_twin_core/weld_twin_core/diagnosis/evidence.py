@@ -29,6 +29,8 @@ from .algebra.workspace import Library, Role, Workspace
 from .beliefs import Beliefs
 from .result import Family, Structure
 
+NAMED = 3
+"""Things that a sentence names at the most: more are no place to begin at."""
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
 

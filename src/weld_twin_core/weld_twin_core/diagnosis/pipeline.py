@@ -270,9 +270,8 @@ def _without_strays(result: Search, beliefs: Beliefs) -> tuple[Search, Unseen, S
 def _alone(result: Search, shrink: Shrink) -> Search:
     """Return what was found with what a robot file alone does of it."""
     model = result.final.model
-    own = replace(
-        model, alone=alone(result.problem, model, result.scale, shrink, many=result.dense)
-    )
+    fitted = result.problem, model, result.scale
+    own = replace(model, alone=alone(*fitted, shrink, result.work.beliefs, many=result.dense))
     return replace(result, final=replace(result.final, model=own))
 
 

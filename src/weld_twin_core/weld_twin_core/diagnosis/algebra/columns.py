@@ -26,8 +26,8 @@ from .problem import Model, Problem, Scale
 
 Rows = slice | Index
 """Some rows: a slice, or their numbers."""
-MANY = 32
-"""Coordinates of one effect in a model from which on they are kept as amounts: fewer are as quick."""
+MANY = 200
+"""Columns from which on it pays to keep them as amounts, and an inverse of them all for every choice."""
 SHOWN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise to be seen."""
 BLOCKS = 24

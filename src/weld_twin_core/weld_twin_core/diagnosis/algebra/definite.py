@@ -33,6 +33,8 @@ FLAT = 1e-9
 """A direction, or a column once others are projected out, of less than this share carries nothing."""
 SLIGHT = 1e-6
 """Share of a number that decides nothing, though it is far above rounding."""
+REWEIGHTED = 15
+"""Times that something is found anew by weights of what it leaves; it settles within ten."""
 HIDDEN = 0.05
 """Part of what an error does to the tool that fitted frames must leave of it for it to be told from
 them: formulas are a few per cent off real arms, so that less says nothing of the error."""

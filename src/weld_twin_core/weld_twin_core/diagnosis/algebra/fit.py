@@ -295,18 +295,18 @@ def robust_scale(
     return Scale(sigma, sigma_turn, tuple(weights))
 
 
-def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
+def trusted(weights: Sequence[Array]) -> list[NDArray[np.bool_]]:
     """
     Return which samples count in every quoted figure, (M,) per recording.
 
-    All but outliers, and of those no more than `SET_ASIDE` (or a few) are left out, the farthest:
+    All but outliers, and of those no more than `SET_ASIDE` (or one) are left out, the farthest:
     what many samples do is structure, and must show in what is left. Strays, each by itself and
     farther off than any structure, are left out all the same: one would be the whole RMS. So are
     those without any weight, which were left out before.
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
     far = sum(int(part.sum()) for part in strays(weights, (HUBER / STRAY) ** 2))
-    aside = max(few, int(SET_ASIDE * every.size), far)
+    aside = max(1, int(SET_ASIDE * every.size), far)
     least = float(np.sort(every)[aside]) if every.size > aside else 0.0
     return [(weight > 0.0) & (weight >= min(TRUSTED, least)) for weight in weights]
 
@@ -339,7 +339,7 @@ def robust_fit(
     result = fit(problem, model, scale, precision)
     for _ in range(rounds):
         scale = robust_scale(problem, problem.residuals(result.model))
-        result = fit(problem, result.model, scale, precision, iterations=4)
+        result = fit(problem, result.model, scale, precision)
     return result, scale
 
 

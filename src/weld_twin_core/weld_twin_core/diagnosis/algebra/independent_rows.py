@@ -14,6 +14,8 @@ from .definite import SLIGHT
 Row = TypeVar('Row', bound=np.generic)
 ENOUGH = 12
 """Samples from which on they tell how wide they spread: a median is then good to a quarter."""
+FEWEST = 3
+"""Numbers from which on they show a spread at all: that of two says nothing."""
 NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size: 1 / 0.6745."""
 

@@ -20,10 +20,8 @@ from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...errors import DataError
-from .definite import FLAT, ROUNDING, SLIGHT, solved
+from .definite import FLAT, REWEIGHTED, ROUNDING, SLIGHT, solved
 
-ROUNDS = 15
-"""Times that variances and noise are learned in turn; they settle within ten."""
 JITTER = (ROUNDING, FLAT, SLIGHT, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
 
@@ -59,7 +57,7 @@ def learned_precision(
     members, count = labels[tied], variance.size
     learned_of = np.bincount(members, minlength=count) > 0
     noise, room = 1.0, np.empty_like(normal)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         precision = _precision(tied, variance, labels, usual)
         mean, spread = _solved(normal, right, noise, precision, room)
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)

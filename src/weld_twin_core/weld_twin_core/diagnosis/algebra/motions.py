@@ -26,21 +26,18 @@ from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
 from .definite import EMPTY, SLIGHT, outside, share_outside, span_of
-from .problem import Site
+from .problem import LEVER, Site
 
 STILL = 0.04
 """Travel [rad] below which a joint stands still: a scale of 0.1 % moves by 0.04 mrad over it."""
 STILL_SLIDE = 2e-3
 """The same for a joint that slides, [m]."""
 WIDE = 0.5
-"""Travel [rad, m] from which on a joint shows well how something depends on its angle."""
-MOST_OF_IT = 0.5
-"""Share of what a joint can travel at all that is wide where that is less."""
+"""Travel [rad, m], or half of all that there is, from which on a joint shows well how something
+depends on its angle."""
 REASON = 'the joint hardly moves'
 POSTURES = 40
 """Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
-LEVER = 0.5
-"""Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
 SEED = 1
 """Of the postures: any generic set gives the same answer."""
 
@@ -87,7 +84,7 @@ def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     """Return the joints that do not move widely, all recordings together."""
     ends = [(r.joints.q.min(axis=0), r.joints.q.max(axis=0)) for r in recordings]
     travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
-    wide = np.minimum(WIDE, MOST_OF_IT * (robot.upper - robot.lower))
+    wide = np.minimum(WIDE, (robot.upper - robot.lower) / 2.0)
     return tuple(np.array(robot.joint_names)[travel < wide].tolist())
 
 

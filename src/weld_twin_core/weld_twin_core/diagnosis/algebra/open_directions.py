@@ -19,7 +19,7 @@ from ...arrays import Array
 from .definite import FLAT
 from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
 from .independent_rows import effective_share
-from .problem import Model, Problem, Scale
+from .problem import ROWS, Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)
 """A frame error [m, rad] that the data should show."""
@@ -28,11 +28,9 @@ NEAR = (0.1, 0.3)
 is another, and says nothing."""
 WORSE = 4.0
 """Chi-square per direction that the given frames may cost: two standard deviations."""
-ROUNDS = 3
+ROUNDS = 2
 """Gauss-Newton steps by which the rest follows; it starts next to where it ends."""
 AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
-ROWS = 3000
-"""Rows from which directions are taken."""
 
 
 class Open(NamedTuple):

@@ -30,6 +30,8 @@ from .independent_rows import by_sample
 FRAMES = ('base', 'tool')
 ROWS = 9000
 """Rows on which effects and changes are looked for, and what is left open: more show the same."""
+LEVER = 0.5
+"""Metres that a radian counts as, where turns and positions are weighed together."""
 PLACES = 3
 """Places of contacts from which on each is left out as a whole. Of two, one alone would have to tell
 of the other what only both together show."""
@@ -389,7 +391,7 @@ class Problem:
 
     def unit_scale(self) -> Scale:
         """Return a scale before anything is known of the noise."""
-        return Scale(1e-4, 2e-4, tuple(self.given_weights))
+        return Scale(1e-4, 1e-4 / LEVER, tuple(self.given_weights))
 
 
 def usable(recording: Recording) -> Recording:

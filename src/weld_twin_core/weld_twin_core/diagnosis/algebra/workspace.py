@@ -25,12 +25,10 @@ from ..beliefs import Beliefs
 from .columns import Columns, designed
 from .definite import EMPTY, FLAT, REPEATED, ROUNDING, Index, unit_diagonal
 from .fit import Fit, design, fit, predict_fit
-from .independent_rows import effective_share
+from .independent_rows import FEWEST, effective_share
 from .problem import Model, Problem, Scale, Site
 from .starts import started
 
-FEWEST = 3.0
-"""Independent rows at the least: a position has three coordinates."""
 FAR, FAR_SHARE = 60.0, 1.5
 """Log Bayes factor behind, and times what is left, from which on a fit that a linear step foretells is
 not worth doing: others that bend take over some of what is missing, but not a third."""
@@ -339,14 +337,14 @@ class Workspace:
             place = end
         return out
 
-    def fitted(self, model: Model, iterations: int = 4, most: float = np.inf) -> Fit:
-        """Return the fit of a model that is nearly there; of one that leaves too much, a sketch."""
-        return fit(self.problem, model, self.scale, None, iterations, most=most)
+    def fitted(self, model: Model, most: float = np.inf) -> Fit:
+        """Return the fit of a model; of one that leaves too much, a sketch."""
+        return fit(self.problem, model, self.scale, most=most)
 
     def fitted_with(self, model: Model, effect: Effect) -> Fit:
         """Return the fit of a model with one more effect, merged where its kind can merge."""
         effect = started(self.problem, model, self.scale, effect)
-        return self.fitted(model.with_found(merged(model.found, effect)), 5)
+        return self.fitted(model.with_found(merged(model.found, effect)))
 
     def ahead(self, own: Fit, now: Fit) -> float:
         """

@@ -23,7 +23,8 @@ from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.motions import narrow
-from ..algebra.problem import Scale
+from ..algebra.problem import ROWS, Scale
+from ..beliefs import CAUSES
 from ..evidence import LIKELIER, Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part
@@ -40,12 +41,8 @@ what full confidence adds. Of 21 in development cells 19 did; two, with 0.3 and 
 _EVEN = 0.5
 """The same where an explanation without a name is to be found by its place and dependence: too few such
 experiments were seen to promise more than an even chance."""
-MOST = 6
-"""Explanations compared at most; each is predicted for every measurement that could be made."""
 _ALTERNATIVES = 2
 """Other places or dependences that are compared with the one that fits best."""
-_ROWS = 2000
-"""Rows that an alternative's curves are fitted on: only its shape counts."""
 
 
 def next_step(
@@ -93,11 +90,11 @@ def _parting(
     wanted = next_experiment(
         result.work.problem,
         result.small.model,
-        listed[:MOST],
+        listed[:CAUSES],
         _as_weighed(result),
         limits,
         closed=closed,
-        named=min(named, MOST),
+        named=min(named, CAUSES),
     )
     return None if wanted is None else {**wanted, 'promise': _promise(verdict, wanted)}
 
@@ -146,7 +143,7 @@ def _beside(result: Search) -> list[Explanation]:
     ranked = result.work.ranked(result.small, result.effective(result.small))
     taken = {(effect.name, effect.site) for effect in model.found}
     more = [choice for choice in ranked if choice.unit.site not in taken]
-    return [(*model.found, choice.effect()) for choice in more[: MOST - 1]]
+    return [(*model.found, choice.effect()) for choice in more[: CAUSES - 1]]
 
 
 def _without_names(
@@ -183,6 +180,6 @@ def _others(parts: Sequence[Part]) -> list[Group]:
 
 
 def _fitted(result: Search, effects: Explanation) -> Explanation:
-    few = result.problem.thinned(_ROWS)
+    few = result.problem.thinned(ROWS)
     scale = replace(result.scale, weights=tuple(np.ones(m) for m in few.samples))
-    return fit(few, result.final.model.with_found(effects), scale, None, 3).model.found
+    return fit(few, result.final.model.with_found(effects), scale).model.found

@@ -23,13 +23,11 @@ from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...errors import DataError
 from ...recording import Measurements, Recording
-from ..algebra.definite import FLAT
-from ..algebra.fit import fit
+from ..algebra.definite import FLAT, REWEIGHTED
+from ..algebra.fit import LEAST_NOISE, fit
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
-from .alignment import FLOOR, NEAR, initial_frames
+from .alignment import NEAR, initial_frames
 
-ROUNDS = 20
-"""Times that the tool vector is found anew with less weight for what is off; it settles sooner."""
 FEWEST = 2
 """Postures that one contact needs at the least: of a single one its unknown place takes everything."""
 NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperature')
@@ -182,7 +180,7 @@ def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
     """Return the vector in the flange that stays in place at every contact, shape (3,) [m]."""
     weights: list[Array] = [np.ones(len(point)) for point, _ in touched]
     vector: Array = np.zeros(3)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         square, right, off = np.zeros((3, 3)), np.zeros(3), []
         for (point, turn), weight in zip(touched, weights, strict=True):
             share = weight / weight.sum()
@@ -192,7 +190,9 @@ def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
             right += np.einsum('m,mki,mk', weight, columns, left)
             off.append((columns, left))
         vector = np.asarray(np.linalg.lstsq(square, right, rcond=FLAT)[0], dtype=float)
-        weights = [1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), FLOOR) for c, s in off]
+        weights = [
+            1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), LEAST_NOISE) for c, s in off
+        ]
     return vector
 
 

@@ -29,22 +29,14 @@ import numpy as np
 
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
-from ..algebra.definite import ROUNDING, SLIGHT
-from ..algebra.fit import FRAME_SHIFT, fit, robust_scale
-from ..algebra.problem import Model, Problem
+from ..algebra.definite import REWEIGHTED, ROUNDING, SLIGHT
+from ..algebra.fit import FRAME_SHIFT, LEAST_NOISE, fit, robust_scale
+from ..algebra.problem import LEVER, ROWS, Model, Problem
 
 NEAR = FRAME_SHIFT
 """Median gap [m] from which a least-squares fit finds its own way."""
-MOST_ROWS = 3000
-"""Rows that the frames are found on: far more than their numbers need, few enough to be quick."""
-ROUNDS = 15
-"""Steps of each refinement; there is no test of convergence."""
 STEPS = 3
 """Reweighted steps of the bases in each round of bases and tool vector in turn."""
-LEVER = 0.1
-"""Metres that a radian counts as, where turns and positions are weighed together."""
-FLOOR = 1e-5
-"""Gap [m] below which a sample gains no more weight."""
 TOGETHER = 16
 """Trials that are taken at once: enough to share the steps, few enough for the processor's cache."""
 REACHES = (0.1, 0.4)
@@ -58,7 +50,7 @@ def initial_frames(problem: Problem, model: Model) -> Model:
     Frames that are near already stay as they are, and so does what the data cannot tell. Only
     frames in ``problem.align`` move; the tool moves when moving the base is not enough.
     """
-    few, align = problem.thinned(MOST_ROWS), problem.align
+    few, align = problem.thinned(ROWS), problem.align
     own = tracks(few, model)
     if not align or _gap(own, model) < NEAR:
         return model
@@ -95,7 +87,7 @@ def refined(problem: Problem, model: Model) -> Model:
     result, model = model.found, model.with_found(())
     for _ in range(3):
         scale = robust_scale(problem, problem.residuals(model))
-        model = fit(problem, model, scale, iterations=8).model
+        model = fit(problem, model, scale).model
     return model.with_found(result)
 
 
@@ -128,7 +120,7 @@ def _base_only(tracks: list[Track], model: Model) -> Model:
 def _tool_only(tracks: list[Track], model: Model) -> Model:
     start = model.robot.T_flange_tool
     tool, weights = start, [np.ones(len(track.position)) for track in tracks]
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         moment, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
         for track, base, weight in zip(tracks, model.bases, weights, strict=True):
             axes = base[:3, :3]
@@ -144,7 +136,7 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
         vector = start[:3, 3] + np.linalg.solve(normal + SLIGHT * total * np.eye(3), right)
         tool = transform(rotation, vector)
         pairs = zip(tracks, model.bases, strict=True)
-        weights = [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
+        weights = [1.0 / np.maximum(track.gap(base, tool), LEAST_NOISE) for track, base in pairs]
     return replace(model, robot=model.robot.with_frames(tool=tool))
 
 
@@ -185,7 +177,7 @@ def _tool_rotations(tracks: list[Track], start: Array) -> Array:
     trials = len(start)
     rotation, unclear = start, np.zeros(trials, dtype=bool)
     weights: list[Array] = [np.ones(track.position.shape[:2]) for track in tracks]
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         total = np.zeros((trials, 9, 9))
         for track, weight in zip(tracks, weights, strict=True):
             flat = (*track.position.shape[:2], 9)
@@ -196,7 +188,7 @@ def _tool_rotations(tracks: list[Track], start: Array) -> Array:
             kron = kron.reshape(trials, 9, 9)
             total += kron @ np.swapaxes(kron, 1, 2) / weight.sum(axis=1)[:, None, None]
         size, vectors = np.linalg.eigh(total)
-        unclear |= size[:, -2] > (1.0 - 1e-5) * size[:, -1]
+        unclear |= size[:, -2] > (1.0 - SLIGHT) * size[:, -1]
         transpose = vectors[..., -1].reshape(trials, 3, 3)
         sign = np.sign(np.linalg.det(transpose))[:, None, None]
         rotation = nearest_rotation(np.swapaxes(transpose, 1, 2) * sign)
@@ -213,7 +205,7 @@ def _turn_weight(track: Track, tool: Array) -> Array:
     for _ in range(3):
         moment = (weight[:, None] @ products).reshape(-1, 3, 3)
         base = nearest_rotation(moment)
-        weight = 1.0 / np.maximum(chord(track.turns, base[:, None] @ turned), FLOOR / LEVER)
+        weight = 1.0 / np.maximum(chord(track.turns, base[:, None] @ turned), LEAST_NOISE / LEVER)
     return weight
 
 
@@ -235,10 +227,12 @@ def in_turn(
     turn, vectors: of the tool, (T, 3, 3), which stays, and to start from, (T, S, 3) [m].
     """
     result = _started(bases, vectors)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTED):
         result = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, result, strict=True)]
         vectors = _vectors(tracks, result, turn, vectors)
-    result = [_based(*pair, turn, vectors, ROUNDS) for pair in zip(tracks, result, strict=True)]
+    result = [
+        _based(*pair, turn, vectors, REWEIGHTED) for pair in zip(tracks, result, strict=True)
+    ]
     gaps = [_gaps(*pair, turn, vectors) for pair in zip(tracks, result, strict=True)]
     best = np.median(np.concatenate(gaps, axis=2), axis=2).argmin(axis=1)
     each = np.arange(len(best)), best
@@ -250,7 +244,7 @@ def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> t
     """Return the base frames of known tools, each (T, 4, 4); see `in_turn`."""
     turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
     pairs = zip(tracks, _started(bases, vectors), strict=True)
-    result = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]
+    result = [_based(*pair, turn, vectors, REWEIGHTED) for pair in pairs]
     return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in result)
 
 
@@ -296,7 +290,7 @@ def _based(track: Track, start: Bases, turn: Array, vectors: Array, rounds: int)
         size = np.linalg.norm(moment, axis=(-2, -1))[..., None, None]
         rotation = nearest_rotation(moment + SLIGHT * size * start.rotation)
         base = Bases(rotation, middle - (rotation @ centre[..., None])[..., 0])
-        weight = 1.0 / np.maximum(_gaps(track, base, turn, vectors, reached), FLOOR)
+        weight = 1.0 / np.maximum(_gaps(track, base, turn, vectors, reached), LEAST_NOISE)
     return base
 
 
@@ -320,7 +314,7 @@ def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Ar
     for track, base in zip(tracks, bases, strict=True):
         trials, samples = track.turn.shape[:2]
         there = _reached(track, start)
-        weight = 1.0 / np.maximum(_gaps(track, base, turn, start, there), FLOOR)
+        weight = 1.0 / np.maximum(_gaps(track, base, turn, start, there), LEAST_NOISE)
         whole = weight.sum(axis=2)
         share = weight / whole[..., None]
         # In base axes the columns are the flange's rotations, whose squares are the unit matrix.

@@ -23,7 +23,7 @@ from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
-from ..algebra.definite import REPEATED, unit_diagonal
+from ..algebra.definite import REPEATED, REWEIGHTED, unit_diagonal
 from ..algebra.fit import (
     coordinates,
     design,
@@ -44,8 +44,6 @@ from ..result import Changed, Site
 
 SURE = 3.0
 """Standard errors from which a change is reported, RMS of several numbers: chance once in 400 times."""
-REWEIGHTED = 6
-"""Fits with the weights of the last: so many until an outlier of a hundred noises has lost its own."""
 UNTOLD = 0.9
 """A coordinate whose spread after the data is this share of that before is not shown by them."""
 
@@ -97,7 +95,7 @@ def with_changes(
     picked = tuple(candidates[i] for i in sorted(chosen))
     model = replace(free, changes=tuple(free.changes[i] for i in sorted(chosen)))
     few = replace(every, changes=picked)
-    model = fit(few, model, scale, prior, iterations=8).model
+    model = fit(few, model, scale, prior).model
     problem = replace(problem, changes=picked)
     return problem, model if result else model.with_found(())
 
@@ -132,10 +130,10 @@ def _freed(
     later fit; one of 10 mm would else make the noise of all.
     """
     scale = robust_scale(problem, problem.residuals(model))
-    model = fit(problem, model, with_weights(scale, problem), precision, iterations=8).model
+    model = fit(problem, model, with_weights(scale, problem), precision).model
     for _ in range(REWEIGHTED):
         scale = robust_scale(problem, problem.residuals(model), freedom=freedom)
-        model = fit(problem, model, scale, precision, iterations=4).model
+        model = fit(problem, model, scale, precision).model
     return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 

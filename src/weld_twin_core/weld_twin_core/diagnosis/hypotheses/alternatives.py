@@ -21,13 +21,11 @@ from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
 from ..algebra.workspace import Choice, Part, Role, Workspace, evidence
+from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
 from .other_sets import Other
 from .selection import backward, implausible, sites
-
-SHORTLIST, BESIDE = 7, 3
-"""Alternatives that may be in the model, and others of each role, fitted at most; bounds the time."""
 
 
 def fit_alternatives(
@@ -80,7 +78,7 @@ def _near(
         best - max(work.beliefs.alternative_log_bayes, work.beliefs.alternative_share * best), 0.0
     )
     near = [c for c in choices if c.log_bayes > least]
-    return near[: SHORTLIST if role is Role.FOUND else BESIDE]
+    return near[:SHORTLIST]
 
 
 def _weighed(every: Sequence[Alternative], temperature: float) -> CandidateSet:

@@ -33,19 +33,14 @@ from ..algebra.workspace import (
     parts,
     ranking,
 )
+from ..beliefs import CAUSES, SHORTLIST
 from ..result import Site
-from .selection import backward, implausible, sites
+from .selection import ROUNDS, backward, implausible, sites
 
-BEGUN = 6
-"""Effects that a set is begun with, in turn; bounds the time."""
 COMPLETED = 2
 """Sets of these, the best with one effect more, that are completed; bounds the time."""
-LONGEST = 6
-"""Effects that a set gains at most: cells have one to six causes."""
 AHEAD = 1.0
 """Log Bayes factor by which another set must be ahead to be taken: less is rounding."""
-ROUNDS = 4
-"""Sets taken one after the other at most; bounds the time."""
 
 
 class Other(NamedTuple):
@@ -140,13 +135,13 @@ class Sets:
 
     def without(self, start: list[Choice], never: Part | None) -> list[Choice]:
         """Return the best set that begins with another and lacks a part, if any."""
-        entering = self._entering(start, never)[:BEGUN]
+        entering = self._entering(start, never)[:SHORTLIST]
         self._know(_columns(entering))
         begun = [[*start, first] for first in entering]
         grown = (self._grown(one, never, 1) for one in begun)
         more = {frozenset(choice.part for choice in one): one for one in grown}
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
-        return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
+        return max((self._grown(one, never, CAUSES) for one in best), key=self.worth, default=[])
 
     def _entering(self, chosen: Sequence[Choice], never: Part | None) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
@@ -217,7 +212,7 @@ def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
         elif order is not None:
             own = own.search.with_orders(np.array([order]))
         result = merged(result, own)
-    return work.fitted(now.model.with_found(result), 8, work.hopeless(now))
+    return work.fitted(now.model.with_found(result), work.hopeless(now))
 
 
 def _columns(chosen: Sequence[Choice]) -> list[int]:

@@ -24,14 +24,10 @@ from ..result import Site
 from .alternatives import fit_alternatives, with_leads
 from .library import build
 from .other_sets import AHEAD, Sets, reconsidered
-from .selection import backward, forward, implausible, possible, possible_part, sites
+from .selection import ROUNDS, backward, forward, implausible, possible, possible_part, sites
 
 FIT_ROWS = 30000
 """Rows that a final fit works on; more only take time, as neighbours err alike."""
-ROUNDS = 3
-"""Times that a library is built anew at what was found; the second seldom changes anything."""
-SWAPS = 3
-"""Times that an alternative that is clearly ahead may take an effect's place."""
 Progress = Callable[[str], None]
 LeftOn = Callable[[Search], float]
 """What the final model of a search leaves on held-out recordings, RMS [m]."""
@@ -110,7 +106,7 @@ def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[C
     if not now.model.found:
         return now, ()
     sets, had = Sets.about(work, now), [names(now.model)]
-    for attempt in range(SWAPS + 1):
+    for attempt in range(ROUNDS + 1):
         now, others = reconsidered(work, now, sets)
         progress('other sets weighed')
         candidate_sets = []
@@ -121,7 +117,7 @@ def settled(work: Workspace, now: Fit, progress: Progress) -> tuple[Fit, tuple[C
             own = next(r for r in candidate_sets[-1] if r.fit is now)
             # What was had before comes back only where that is more than rounding.
             most = own.log_bayes + AHEAD * (names(leader.fit.model) in had)
-            if leader.log_bayes > most and attempt < SWAPS:
+            if leader.log_bayes > most and attempt < ROUNDS:
                 swapped = backward(work, leader.fit)
                 # An alternative that does not earn a place itself takes none from what did.
                 if leader.site in sites(swapped):
@@ -145,8 +141,8 @@ def workspace(
 ) -> tuple[Workspace, Fit]:
     """Return what selection works on, and the fit that it starts from."""
     scale = robust_scale(problem, problem.residuals(model))
-    now = fit(problem, model, scale, None, 4)
-    bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
+    now = fit(problem, model, scale)
+    bare = fit(problem, now.model.with_found(()), scale).rss
     library = build(problem, now.model, scale, exclude)
     return Workspace(problem, scale, library, beliefs, bare), now
 

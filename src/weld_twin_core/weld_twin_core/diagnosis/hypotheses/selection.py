@@ -15,10 +15,11 @@ from ...effects.plausible import beyond
 from ..algebra.fit import Fit
 from ..algebra.problem import Model
 from ..algebra.workspace import Choice, Workspace, evidence
+from ..beliefs import SHORTLIST
 from ..result import Site
 
-SHORTLIST = 4
-"""Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+ROUNDS = 3
+"""Times that a choice is made anew at what it led to: the second seldom changes anything."""
 
 
 class _Step(NamedTuple):

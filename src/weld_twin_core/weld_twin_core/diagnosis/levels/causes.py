@@ -29,7 +29,7 @@ from ..unseen.unseen_stretches import Unseen
 from .curved import Curved
 from .free_form import FreeForm, Part
 
-LISTED = 0.02
+LISTED = Beliefs.listed
 """A place, dependence or name less probable than this is not listed."""
 SHARED = 0.002
 """Share by which an interval reaches further on each side than its folds show: they share the
@@ -291,10 +291,7 @@ def _contributions(unseen: Unseen) -> Array:
     total = unseen.targets[1:].sum(axis=0) if len(unseen.parts) else np.zeros(0)
     # A product of two fields is a difference of two squares.
     return np.array(
-        [
-            0.25 * (unseen.squares(total + t) - unseen.squares(total - t))
-            for t in unseen.targets[1:]
-        ]
+        [(unseen.squares(total + t) - unseen.squares(total - t)) / 4 for t in unseen.targets[1:]]
     )
 
 
@@ -320,7 +317,7 @@ def _spread(
     """Return the standard error of every share, by leaving out one fold at a time."""
     names = np.unique(labels)
     if names.size < 3 or not claims:
-        return np.full(len(claims), 0.5)
+        return np.ones(len(claims))
     tries = np.array([_shares(squares, parts, claims, labels != n) for n in names])
     return np.asarray(np.sqrt(jackknife(tries)))
 

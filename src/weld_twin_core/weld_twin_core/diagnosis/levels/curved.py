@@ -12,6 +12,7 @@ import numpy as np
 from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.fit import fit, robust_fit
+from ..algebra.problem import ROWS
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Left, Scatter, Search, Verdict
 from ..result import NAMING, Shrink, Site, Structure
@@ -20,9 +21,6 @@ from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
 from .free_form import FreeForm, Part, free_form
-
-ROWS = 6000
-"""Rows that groups are chosen on; the curves are fitted on all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +67,7 @@ def _beside(
     own = bare.coordinates.size
     precision = np.concatenate([np.zeros(own), form.precision])
     full = result.problem
-    nearly = fit(small, model, scale, precision, 4).model
+    nearly = fit(small, model, scale, precision).model
     final, scale = robust_fit(full, nearly, precision, rounds=1)
     changed = replace(result, final=final, scale=scale, precision=precision, dense=False)
     if any(part.any() for part in result.scale.left_out):

@@ -16,21 +16,12 @@ from ...effects.effect import Effect
 from ..algebra.definite import EMPTY, FLAT, factored
 from ..algebra.fit import Fit
 from ..algebra.problem import Problem, Scale
-from ..beliefs import Beliefs
-from ..evidence import marginal
+from ..beliefs import CAUSES, SHORTLIST, Beliefs
+from ..evidence import LIKELIER, NAMED, marginal
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
-from ..unseen.folds import steadiness, ways_to_divide
+from ..unseen.folds import STRETCHES, steadiness, ways_to_divide
 from ..unseen.groups import Group, all_groups
-from ..unseen.unseen_stretches import Base, Unseen
-
-STANDS_OUT, NAMED = 0.5, 3
-"""Weight from which one place is named alone, and how many are named where none has it."""
-RIDGES = (1e-1, 1e1, 1e3)
-"""Prior precision of the columns of a group in units of noise: from free to hardly there."""
-MOST = 6
-"""More groups than this at once say that nothing simple is at work."""
-SHORTLIST = 6
-"""Groups tried on unseen folds at every step, those that fit best; the right one was within four."""
+from ..unseen.unseen_stretches import RIDGES, Base, Unseen
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +43,7 @@ class Part:
     def words(self) -> str:
         """Return the group as people read it, or the places where none stands out."""
         places = self.weight_of('at')
-        if len(places) < 2 or max(places.values()) > STANDS_OUT:
+        if len(places) < 2 or max(places.values()) > LIKELIER:
             return str(self.group)
         return ' or '.join(list(places)[:NAMED])
 
@@ -74,10 +65,8 @@ class FreeForm:
         return np.concatenate([np.zeros(0), *held])
 
 
-STRETCHES = 10
-"""Stretches of time that take turns in being unseen."""
 SHORT = 60
-"""Short stretches of which every tenth is left out together: what wanders is predicted from its
+"""Short stretches of which every eighth is left out together: what wanders is predicted from its
 neighbours in time, though not a minute later."""
 
 
@@ -91,7 +80,7 @@ def free_form(
     predict short stretches from their neighbours.
     """
     groups = list(all_groups(problem, bare.model, scale, wandering=wandering))
-    labels = ways_to_divide(problem, STRETCHES)
+    labels = ways_to_divide(problem)
     if wandering:
         labels = [problem.block_labels(SHORT) % STRETCHES]
     fitted = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
@@ -176,7 +165,7 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
     """Return the few groups that predict best together; none where none is worth it."""
     members: list[Member] = []
     now = work.errors(members)
-    while len(members) < MOST:
+    while len(members) < CAUSES:
         tried = [(_worst_gain(now, errors), m, errors) for m, errors in work.entrants(members)]
         if not tried:
             break
@@ -240,7 +229,7 @@ def alternative_weights(
     own = (members[k], work.errors(members))
     tried = [own, *(pair for pair in work.entrants(rest) if pair[0].group != own[0].group)]
     totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
-    weights = (totals / max(totals.min(), EMPTY)) ** (-beliefs.group_rows / 4.0)
+    weights = (totals / max(totals.min(), EMPTY)) ** (-beliefs.group_rows / 4)
     # A group that needs fewer columns to do the same is the likelier one: freedom only helps.
     weights /= np.array([len(work.groups[m.group].columns) for m, _ in tried])
     weights /= weights.sum()

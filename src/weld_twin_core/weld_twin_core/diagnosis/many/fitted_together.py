@@ -19,13 +19,14 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
+from ..algebra.columns import MANY
 from ..algebra.definite import EMPTY, ROUNDING
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..evidence import Search
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import ways_to_divide
-from ..unseen.unseen_stretches import Unseen
+from ..unseen.unseen_stretches import RIDGES, Unseen
 from .small_errors import many_small, predicted
 
 BEAR = (10, 30, 100)
@@ -36,12 +37,6 @@ could not tell.
 """
 PLENTY = 600
 """Stations from which on only the richest is fitted: they bear all of it, and time is saved."""
-FEW_COLUMNS = 200
-"""Coordinates up to which sizes are learned anew for every part that is left out: with more there are
-so many stations that sizes hardly hang on some of them, and it would take minutes."""
-LEARNED = (0.1, 1.0, 10.0, 100.0)
-"""Precisions of sizes that many errors could have had, in units of those learned: from three times as
-large to a tenth."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
@@ -94,7 +89,7 @@ def _by_chance(few: Search, many: Search, before: float, remaining: float) -> bo
         own.columns.written_out(),
         own.precision,
         [columns[frames:] / size[frames:]],
-        LEARNED,
+        RIDGES,
         ways_to_divide(many.problem),
     )
     return share <= chance_gain(tried, -np.inf, pooled=True)
@@ -189,5 +184,10 @@ def unseen_rms(result: Search) -> float:
 
 
 def _relearned(result: Search) -> bool:
-    """Return whether the sizes of many are learned anew for every part left out."""
-    return result.dense and result.final.coordinates.size <= FEW_COLUMNS
+    """
+    Return whether the sizes of many are learned anew for every part left out.
+
+    With more there are so many stations that sizes hardly hang on some of them, and it would take
+    minutes.
+    """
+    return result.dense and result.final.coordinates.size <= MANY

@@ -36,6 +36,7 @@ from ..algebra.fit import (
     solve_scaled,
     stepped,
 )
+from ..algebra.independent_rows import FEWEST
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.motions import candidate_kinds, hardly_moves, lacking, moved_most, separable_orders
 from ..algebra.problem import Model, Problem, Scale
@@ -272,7 +273,7 @@ def groups(result: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
     scales = [effect.fit.coordinate_scales() for effect in result]
     names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     numbers = np.array([names[label] for label in labels], dtype=int)
-    free = np.bincount(numbers, minlength=len(names))[numbers] < beliefs.tied_from
+    free = np.bincount(numbers, minlength=len(names))[numbers] < FEWEST
     return np.where(free, -1, numbers), np.concatenate([np.zeros(0), *scales])
 
 

@@ -42,6 +42,7 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import MICROMETRE, NoiseFloor
 from ..algebra.open_directions import AXES, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale
+from ..evidence import NAMED
 from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
@@ -53,8 +54,6 @@ POSTURES = 100
 """Enough for a median to be good to some per cent."""
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
-MOST = 3
-"""Axes that name a direction."""
 Rooted = Callable[[Products], tuple[Array, Array]]
 """Mean of the coordinates given all rows but those of a part, and a root S of their covariance S S'."""
 USUAL = 0.5
@@ -289,7 +288,7 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     for vector in result.vectors.T:
         share = np.abs(vector / result.size)
         order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]
-        out.append(' with '.join(in_words(result.names[i]) for i in order[:MOST]))
+        out.append(' with '.join(in_words(result.names[i]) for i in order[:NAMED]))
     return tuple(out)
 
 

@@ -24,20 +24,23 @@ from ...effects.geometry import ChannelError, FrameError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
 from ..algebra.fit import effect_precision, fit, frame_offset, trusted
-from ..algebra.problem import Alone, Model, Problem, Scale
+from ..algebra.problem import ROWS, Alone, Model, Problem, Scale
+from ..beliefs import Beliefs
 from ..result import Shrink
 from ..unseen.unseen_stretches import Unseen
 
-ROWS = 900
-"""Rows that the constants are fitted on: three hundred positions show frames and some zeros well."""
-LEAST_GAIN = 0.95
-"""Ratio of what is left below which constants of their own are taken: less is a matter of folds."""
 STEPS = 2
 """Steps of a fit that starts nearby; constants are nearly linear."""
 
 
 def alone(
-    problem: Problem, model: Model, scale: Scale, shrink: Shrink, *, many: bool = False
+    problem: Problem,
+    model: Model,
+    scale: Scale,
+    shrink: Shrink,
+    beliefs: Beliefs,
+    *,
+    many: bool = False,
 ) -> Alone | None:
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
@@ -61,7 +64,7 @@ def alone(
     scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3)))
     best, left = None, unseen
     # Aligned frames mean nothing of the arm, so they are where they do best.
-    for start, gain in ((_framed(constants), 1.0), (_freed(constants, many=many), LEAST_GAIN)):
+    for start, gain in ((_framed(constants), 1.0), (_freed(constants, many=many), beliefs.better)):
         precision = effect_precision(start)
         if not problem.frame_count + precision.size:
             continue

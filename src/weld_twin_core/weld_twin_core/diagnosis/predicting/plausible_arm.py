@@ -17,11 +17,9 @@ from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
 from ...twin.directions import Directions, Discrepancy
 from ...twin.features import joints_of
+from ..algebra.fit import FRAME_SHIFT, FRAME_TURN
 from .leftover import Rest
 
-FRAME_WIDTHS = (0.05, 0.05)
-"""Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
-a flange or a tripod is good to some centimetres and degrees."""
 ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
@@ -106,7 +104,7 @@ def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
 
 def widths(robot: Robot, what: Directions) -> Array:
     """Return the standard deviation of every coordinate before the data, shape (P,)."""
-    frames = np.tile(np.repeat(FRAME_WIDTHS, 3), what.frame_count // 6)
+    frames = np.tile(np.repeat((FRAME_SHIFT, FRAME_TURN), 3), what.frame_count // 6)
     fine = np.full(sum(knots.size for knots in what.knots), FINE)
     own = [sizes(robot, effect) for effect in what.effects]
     return np.concatenate([frames, *own, np.full(what.gives, GIVE), fine])

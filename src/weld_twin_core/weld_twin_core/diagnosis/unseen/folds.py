@@ -25,18 +25,16 @@ STRETCHES = 8
 """Folds in time: enough for a standard error, few enough that each shows much."""
 COVERED = 0.9
 """Share of what is told with an interval that it shall hold."""
-MOST_IN_ONE = 0.5
-"""Share of a recording in one region from which on the others do not show its base."""
 
 
-def ways_to_divide(problem: Problem, folds: int = STRETCHES) -> list[Array]:
+def ways_to_divide(problem: Problem) -> list[Array]:
     """
     Return the part of every row, int, shape (rows,), for each way to divide the rows.
 
     Stretches of time, then regions of posture; these not where places of contacts are the parts, as
     a place would lie on both sides.
     """
-    by_time = problem.block_labels(folds)
+    by_time = problem.block_labels(STRETCHES)
     if problem.untracked and problem.places >= PLACES:
         return [by_time]
     return [by_time, posture_regions(problem)]
@@ -73,7 +71,7 @@ def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
     out, at, count = labels.copy(), 0, int(labels.max()) + 1
     for m in samples:
         own = labels[at : at + m]
-        if np.bincount(own).max() > MOST_IN_ONE * m:
+        if np.bincount(own).max() > m / 2.0:
             out[at : at + m] = np.arange(m) * count // m
         at += m
     return np.asarray(out)

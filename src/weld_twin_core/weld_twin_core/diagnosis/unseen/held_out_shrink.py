@@ -15,8 +15,9 @@ from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
 from ..algebra.definite import EMPTY
 from ..algebra.fit import fit, robust_scale, trusted
+from ..algebra.independent_rows import FEWEST
 from ..algebra.problem import Model, Problem, usable
-from ..beliefs import Beliefs
+from ..beliefs import CAUSES, Beliefs
 from ..evidence import Search
 from ..frames.aligned import by_place, posed
 from ..result import Shrink
@@ -25,10 +26,6 @@ from .unseen_stretches import Unseen
 
 WITHIN = 0.95
 """Share of such ratios that the interval told of one shall hold."""
-FEWEST = 3
-"""Folds from which on they show a spread at all."""
-STRAYS, MANY_FOR_ONE = 3, 20
-"""Readings that may be left out of held-out stations, at most, and one in how many."""
 
 
 def held_out_shrink(
@@ -115,7 +112,7 @@ def _waterfall(
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
     """Return RMS in unseen folds as families are added, the best alone first, and of each alone."""
     members: dict[str, list[int]] = {}
-    single = len(model.found) <= 8
+    single = len(model.found) <= CAUSES
     for k, effect in enumerate(model.found):
         name = f'{effect.name} of {effect.site}' if single and effect.site else effect.name
         members.setdefault(name, []).append(k)
@@ -149,8 +146,7 @@ def _on_bags(
             parts = problem.residuals(own)
             pair.append((parts[0][:3] ** 2).sum(axis=0))
             # What is an outlier shows best against the better model, which comes last.
-            few = min(STRAYS, problem.samples[0] // MANY_FOR_ONE)
-            good = trusted(robust_scale(problem, parts).weights, max(few, 1))[0]
+            good = trusted(robust_scale(problem, parts).weights)[0]
         before.append(pair[0][good])
         after.append(pair[1][good])
         fold = np.arange(good.sum()) * STRETCHES // max(int(good.sum()), 1)

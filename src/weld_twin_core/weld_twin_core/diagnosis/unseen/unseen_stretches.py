@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
+from ..algebra.columns import MANY, Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import (
     EMPTY,
     FLAT,
@@ -43,8 +43,6 @@ from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
 RIDGES = (1e-2, 1.0, 1e2, 1e4)
 """Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
-MANY = 200
-"""Columns from which on an inverse of all of them serves every choice of effects."""
 MOST_STEPS = 1e6
 """A squared step counts so many times its variance at the most: far beyond any chance."""
 Solver = Callable[[Array], Array]

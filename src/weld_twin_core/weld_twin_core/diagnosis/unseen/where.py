@@ -18,7 +18,7 @@ from ..algebra.fit import Fit, trusted
 from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
-from ..evidence import Search
+from ..evidence import NAMED, Search
 from ..result import Cause, Structure, Where
 from .chance import Candidates, chance_gain, may_be_chance
 from .folds import Gain
@@ -46,6 +46,7 @@ REGIME_OF = {
     **{name: name for name in REGIMES[2:]},
 }
 """The regime in which each dependence shows."""
+
 STRETCHES = 12
 """Stretches of time for which the gap is reported: as many as a figure can show."""
 
@@ -138,10 +139,6 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
     return {'along_m': float(rms[0]), 'across_m': float(rms[1]), 'normal_m': float(rms[2])}
 
 
-MOST_DEPENDENCES = 3
-"""Things that what remains depends on, reported at the most; further ones are echoes of these."""
-
-
 def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> Structure:
     """Return what groups without a formula add to a model, in folds not used for fitting."""
     problem = unseen.problem
@@ -168,7 +165,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
     reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain]
-    reliable = reliable[:MOST_DEPENDENCES]
+    reliable = reliable[:NAMED]
     names = tuple(str(group) for _, group in reliable)
     of_rest = {(group.at, group.on): one.share for one, group in reversed(reliable)}
     chance = 0.0

@@ -69,7 +69,7 @@ def test_what_is_left_of_touches_depends_on_joints_alone(monkeypatch):
     scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
     bare = fit(problem, model, scale)
     unseen = Unseen.of(problem, scale, bare, np.zeros(0))
-    everything = Beliefs(dependence_gain=-np.inf, dependence_sure=-np.inf)
+    everything = Beliefs(dependence_gain=-np.inf, steady=-np.inf)
     told = where.structure(unseen, model, bare, everything).depends_on
     assert told and all(name.endswith((' shoulder', ' elbow')) for name in told)
 

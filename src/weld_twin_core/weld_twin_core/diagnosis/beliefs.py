@@ -39,14 +39,10 @@ class Beliefs:
     close_log_bayes: float = 8.0
     """Log Bayes factor below the best within which a candidate is fitted as well: the linear
     ranking is a quadratic expansion, and misjudges a response that bends."""
-    close_share: float = 0.15
-    """The same as a share of the best: what the ranking misjudges grows with the effect."""
     invisible: float = 0.12
     """RMS change of the residual [noise] below which a lone effect is not worth a name, however
-    many rows vouch for it. A judgement."""
-    negligible: float = 0.25
-    """RMS change of the residual [noise] below which an effect beside a larger one is not told
-    from that one's misfit. A judgement."""
+    many rows vouch for it; of one beside a larger one twice as much is not told from that one's
+    misfit. A judgement."""
     hope: float = 0.3
     """Exponent by which autocorrelation is believed while causes are still missing, 0 to 1: the
     residual is then the causes' own, and looks far more correlated than the noise is."""
@@ -86,25 +82,19 @@ class Beliefs:
     arm has looks like a motion of the set-up too."""
     family_worth: float = 0.1
     """Share by which the RMS error on unseen data grows without a kind, in the median part left out,
-    from which on the kind is named; a tenth is what a calibration is worth doing for."""
-    joint_worth: float = 0.1
-    """Share of a kind from which on a joint of it is reported, and how nearly as well as the kind
-    another must do to be reported beside it. A judgement."""
-    member_least_m: float = 1e-6
-    """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
+    from which on the kind is named; a tenth is what a calibration is worth doing for. As large a
+    share of a kind a joint must have to be reported."""
 
     # What unseen data say --------------------------------------------------------------------
 
     dependence_gain: float = 0.02
     """Share of the squared unseen error from which what a generic column explains is reported."""
-    dependence_sure: float = 2.0
-    """The same in standard errors between folds."""
+    steady: float = 2.0
+    """What unseen folds gain over its standard error between them, from which on it counts: one
+    chance in forty for each that is looked at."""
     other_setup: float = 5.0
     """Times by which a held-out recording must fit better with a frame of its own to stem from
     another set-up. A judgement."""
-    parted: float = 0.05
-    """Share by which an alternative may leave more on held-out recordings than the effect in the
-    model and still count as its like. Two errors told apart by less are one to a user."""
     farthest: float = 1.0
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
     a model that leaves e times as much elsewhere fits neither."""
@@ -116,45 +106,35 @@ class Beliefs:
     listed: float = 0.03
     """Probability from which on an alternative is named beside a leader that is not sure."""
     unexplained: float = 0.05
-    """Share of the squared gap that may stay unexplained before it is reported as something left, and
-    before the answer is 'unknown' where nothing was found."""
-    least_excess: float = 0.05
-    """Share of the squared floor that a gap counts as standing above it at the least; keeps
-    the share unexplained from a division by next to nothing."""
+    """Share that is little. So much of the squared gap may stay unexplained before it is reported as
+    something left, and before the answer is 'unknown' where nothing was found; more of the squared
+    error a group without a formula must take away to be one of the few. An alternative that leaves
+    no more than this beyond the effect in the model is its like; and a gap counts as standing at
+    least so much of the squared floor above it. On 8 development cases (seed 424202) with causes
+    outside the library 0.02 to 0.05 found the same groups; below, a large gap lost its second."""
     above: float = 1.3
     """What remains must exceed an independently measured floor by this factor to count; the
-    floor itself is known to a tenth or so, and noise has tails."""
+    floor itself is known to a tenth or so, and noise has tails. A floor that only the fit shows may
+    be too low by it besides: with its square two causes outside the library (seed 515001), 1.9 and
+    2.6 times their floor, are no noise."""
     structure_gain: float = 0.03
     """Share of the squared unseen error that a structure must take away to count."""
     structure_sure: float = 3.0
     """What it must take away besides, in standard errors between folds."""
-    blatant_gain: float = 0.15
-    """Share from which on fewer standard errors do: few folds may hold all of a large one."""
     blatant_sure: float = 1.5
-    """Standard errors that such a large structure must take away."""
-    far_above: float = 1.7
-    """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found
-    and nothing shows the noise by itself. A Gaussian gives 1, one with trimmed outliers up to
-    about 1.3; two causes outside the library (seed 515001) gave 1.9 and 2.6 and were called no gap
-    without it. Between the two, nearer to the noise. A judgement."""
+    """Standard errors that a structure must take away which is a large one (`beaten_share`): few folds
+    may hold all of it."""
 
     # Place, dependence and name --------------------------------------------------------------
 
-    group_share: float = 0.05
-    """Share of the squared error so far that a free-form group must take away on unseen folds to
-    be one of the few. On 8 development cases (seed 424202) with causes outside the library 0.02
-    to 0.05 of the error at the start found the same places; below, a large gap lost its second."""
-    group_steady: float = 2.0
-    """The same fall over its standard error between folds: one chance in forty for each group."""
     group_rows: float = 200.0
     """Independent rows that two groups are told apart by, however many there are: beyond some
     hundreds the difference of real physics from every group decides, no longer the noise."""
     beaten_share: float = 0.15
-    """Share of the squared error left that a free form must take away on unseen stretches to be
-    carried beside names, or to show that it is no noise. A cause named rightly leaves noise, of which
-    no curve predicts any; the share leaves room for what real gears are beyond their formulas."""
-    beaten_steady: float = 2.0
-    """The same in standard errors between folds."""
+    """Share that is large. So much of the squared error left a free form must take away on unseen
+    stretches to be carried beside names, or to show that it is no noise: a cause named rightly leaves
+    noise, of which no curve predicts any, and real gears are a little beyond their formulas. Of the
+    evidence of the best candidate the quick ranking misjudges no more."""
     scatter_sure: float = 5.0
     """Standard errors from which on noise is said to come from a joint. Chance reaches 3 of a
     handful of stretches now and then; of those cases the rightly named stay below 4, four with a

@@ -282,7 +282,7 @@ def beyond_doubt(structure: Structure, beliefs: Beliefs) -> bool:
     """Return whether what generic columns find is there beyond doubt."""
     gain, sure = structure.gain, structure.sure
     usual = gain > beliefs.structure_gain and sure > beliefs.structure_sure
-    blatant = gain > beliefs.blatant_gain and sure > beliefs.blatant_sure
+    blatant = gain > beliefs.beaten_share and sure > beliefs.blatant_sure
     return (usual or blatant) and gain > structure.chance
 
 
@@ -308,7 +308,7 @@ class Left:
     def wide(self) -> bool:
         """Return whether what remains is far wider than a floor that only the fit shows."""
         evidence = self.evidence
-        return not evidence.independent and self.rises(self.beliefs.far_above)
+        return not evidence.independent and self.rises(self.beliefs.above**2)
 
     def rises(self, times: float) -> bool:
         """Return whether what remains is so many times the floor, and more than chance makes it."""
@@ -328,7 +328,7 @@ class Left:
         over = evidence.after**2 - evidence.floor**2 if self.high else 0.0
         if self.wide:
             # Such a floor may be too low by that factor; what is beyond is left all the same.
-            over = evidence.after**2 - (self.beliefs.far_above * evidence.floor) ** 2
+            over = evidence.after**2 - (self.beliefs.above**2 * evidence.floor) ** 2
         return float(np.clip(max(structured, over) / self._excess, 0.0, 1.0))
 
     @property
@@ -346,5 +346,5 @@ class Left:
     @property
     def _excess(self) -> float:
         evidence = self.evidence
-        least = self.beliefs.least_excess * evidence.floor**2
+        least = self.beliefs.unexplained * evidence.floor**2
         return max(evidence.gap**2 - evidence.floor**2, least, NANOMETRE**2)

@@ -14,19 +14,16 @@ from ...arm.rotation import transform
 from ...arrays import Array
 from ...recording import JointMotion, Recording, Signal
 from ..algebra.problem import Model, Problem
-from .postures import Limits, Room, joined
+from ..evidence import NAMED
+from .postures import STEP, USUAL_MINUTES, Limits, Room, joined
 
 NAME = 'next measurement'
 STATIONS = 80
 """Stations to choose from; more only take time."""
 PATHS = 9
 """Paths of all joints to choose from: three, each at three speeds."""
-_SINGLE = 4
-"""Joints at most that move alone in some paths: those in question."""
 STAY = 15.0
 """Time [s] that a station takes with the way to it."""
-_STEP = 0.02
-"""Approach of a station from either side [rad, m]."""
 _SOAK = 60.0
 """Time [s] from station to station while the arm warms up."""
 RISE = 15.0
@@ -37,8 +34,8 @@ LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
-_SPEEDS = (1.0, 0.5, 0.25)
-"""Of paths, as shares of the fastest."""
+_HALVED = tuple(2.0 ** -np.arange(3.0))
+"""Speeds of paths, as shares of the fastest, and shares of a range."""
 _LONGEST = 40.0
 """Time [s] of a recorded seam that is run again, backward or slower: half the least experiment."""
 _EVERY = 0.1
@@ -46,7 +43,9 @@ _EVERY = 0.1
 _SLOWER = 2.0
 """How much slower a recorded seam is run again."""
 _ANOTHER = 20.0
-"""Time [min] to set up an instrument that follows the tool where only stations were measured."""
+"""Time [min] to change the cell: another load, tool, instrument or place of it."""
+_ASIDE = 1.5
+"""Distance [m] by which an instrument is moved."""
 
 
 class Piece(NamedTuple):
@@ -115,12 +114,12 @@ class _Here:
                 at += 1
             if len(stops) > 1:
                 # Back the same way: every place is passed in both directions.
-                motions.append(room.travel([*stops, *stops[-2::-1]], _SPEEDS[k % 3]))
+                motions.append(room.travel([*stops, *stops[-2::-1]], _HALVED[k % len(_HALVED)]))
         motions += _retraced(self.problem, room)
         together = len(motions)
-        for name in list(dict.fromkeys(joints))[:_SINGLE]:
+        for name in list(dict.fromkeys(joints))[:NAMED]:
             i = self.model.robot.index(name)
-            motions += [room.travel(_alone(room, i), speed) for speed in _SPEEDS[::2]]
+            motions += [room.travel(_alone(room, i), speed) for speed in _HALVED[::2]]
         return Candidate(
             'path',
             'Run the proposed path, and record joints and tool all the way.',
@@ -139,7 +138,7 @@ class _Here:
             self.spread,
         )
         few = self.spread[: len(self.spread) // 4]
-        approach = np.array([[-_STEP], [0.0], [_STEP], [0.0]])
+        approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
         both = np.repeat(few, 4, axis=0) + np.tile(approach, (len(few), 1))
         yield self._stations(
             'bidirectional',
@@ -164,7 +163,8 @@ class _Here:
         return replace(made, recordings=(replace(recording, wrench=push, wrench_frame='base'),))
 
     def warm_up(self) -> Candidate:
-        again = np.concatenate([self.spread[:5]] * 12)
+        few = self.spread[:5]
+        again = np.tile(few, (int(USUAL_MINUTES) // len(few), 1))
         sentence = 'Measure five stations again and again for an hour while the arm warms up.'
         made = self._stations('warm_up', sentence, again, len(again), seconds=_SOAK)
         (recording,) = made.recordings
@@ -178,7 +178,7 @@ class _Here:
         robot, words = self.model.robot, 'Measure {count} stations'
         more = f'{words} with {MASS:g} kg more hung from the tool point.'
         heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
-        made = self._stations('payload_swap', more, self.spread, set_up=20.0)
+        made = self._stations('payload_swap', more, self.spread, set_up=_ANOTHER)
         model = replace(self.model, robot=heavy)
         yield replace(made, model=model, changed=f'load={MASS:g}')
         longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
@@ -186,17 +186,15 @@ class _Here:
             made,
             kind='longer_tool',
             sentence=f'{words} with a tool {LONGER * 1e3:g} mm longer.',
-            set_up=30.0,
             model=replace(self.model, robot=robot.with_frames(tool=longer)),
             new_tool=True,
             changed='tool',
         )
-        base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ self.model.bases[0]
+        base = transform(np.eye(3), np.array([_ASIDE, 0.0, 0.0])) @ self.model.bases[0]
         yield replace(
             made,
             kind='moved_instrument',
-            sentence=f'Move the instrument by 1.5 m. {words}.',
-            set_up=35.0,
+            sentence=f'Move the instrument by {_ASIDE:g} m. {words}.',
             model=replace(self.model, bases=(base,)),
             new_base=True,
             changed='instrument',
@@ -240,7 +238,7 @@ def _retraced(problem: Problem, room: Room) -> list[JointMotion]:
 
 def _alone(room: Room, i: int) -> list[Array]:
     """Return the stops of one joint that moves through its range, as far as it is free."""
-    for share in (1.0, 0.5, 0.25, 0.1):
+    for share in _HALVED:
         ends = np.tile(room.home, (2, 1))
         ends[:, i] += share * (np.array([room.high[i], room.low[i]]) - room.home[i])
         stops = [room.home, *ends, room.home]

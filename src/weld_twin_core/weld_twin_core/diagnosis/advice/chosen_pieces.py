@@ -18,7 +18,7 @@ from .separation import Explanation, Parting, Side, partings
 
 DECIDES = 6.0
 """Standard deviations from which a measurement decides between two explanations."""
-NOTHING = 3.0
+NOTHING = DECIDES / 2.0
 """Standard deviations below which it changes no verdict."""
 _MARGIN = 2.5
 """Factor by which an experiment parts explanations more than a decision needs: effects are as large as

@@ -40,16 +40,14 @@ from .separation import Explanation
 
 _ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
-_TRIED = 160
+MOST = 40
+"""Touches up to which the number needed is reported, and postures that are weighed at every place."""
+_TRIED = 4 * MOST
 """Postures that are started from at every place; a third of them reach it within the limits."""
-_ENOUGH = 40
-"""Postures that are weighed at every place."""
 SECONDS = 60.0
 """Time from one touch to the next [s], by hand."""
 _NEW = 'new place'
 """Label of what is touched where nothing has been touched yet."""
-_NEW_PLACES = 4
-"""New places that are weighed."""
 _APART = 0.2
 """Distance [m] of a new place from the others at the least."""
 _BELOW = 0.05
@@ -204,7 +202,7 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
         contacts, measured = recording.touched, recording.seen
         rows = np.arange(_TRIED) % contacts.size
         q, good = _reached(problem, model, [recording], measured.position[rows])
-        kept = np.flatnonzero(good)[:_ENOUGH]
+        kept = np.flatnonzero(good)[:MOST]
         if kept.size:
             rows = rows[kept]
             labels = tuple(contacts.labels[row] for row in rows)
@@ -220,7 +218,7 @@ def _beside(problem: Problem, model: Model) -> Iterator[Recording]:
     lowest = min(float(point[2]) for point in known) - _BELOW
     free = forward(model.robot, low + halton(model.robot.n, _TRIED) * (high - low))[:, :3, 3]
     free = free[free[:, 2] > lowest]
-    for _ in range(_NEW_PLACES):
+    for _ in range(PLACES):
         if not free.size:
             return
         away = np.min([np.linalg.norm(free - point, axis=1) for point in known], axis=0)
@@ -230,7 +228,7 @@ def _beside(problem: Problem, model: Model) -> Iterator[Recording]:
         known.append(point)
         targets = np.tile(point, (_TRIED, 1))
         q, good = _reached(problem, model, problem.recordings, targets)
-        kept = np.flatnonzero(good)[:_ENOUGH]
+        kept = np.flatnonzero(good)[:MOST]
         if not kept.size:
             continue
         contacts = Contacts(Artefact((Contact(_NEW),)), (_NEW,) * kept.size)
@@ -260,8 +258,6 @@ def _touching(recording: Recording, q: Array, points: Array, contacts: Contacts)
 
 _COUNT = 12
 """Touches that are proposed: a quarter of an hour by hand."""
-MOST = 40
-"""Touches up to which the number needed is reported."""
 _REACHABLE = 0.9
 """Share of what all touches together could narrow that counts as enough."""
 _MOVING = 10.0

@@ -56,18 +56,16 @@ class Limits:
 _WIDE = 1.2
 """Half the range [rad, m] about the recorded middle that every joint may use, within its limits: the
 instrument still sees the tool, and the arm does not turn over."""
-_INSET = 0.02
-"""Distance to a joint's limits [rad, m]; an approach from either side has room in it."""
+STEP = 0.02
+"""Approach of a station from either side [rad, m], for which there is room to a joint's limits."""
 _DRAWN = 12
 """Postures drawn for each that is wanted, before fewer have to do."""
 _LOOKED_FOR = 2000
 """Postures that are drawn to find one in the box of the cell."""
 _CHECKED = 8
 """Places of a way between two postures that are checked."""
-_FASTEST = 0.5
-"""Share of the joints' velocity limits that an experiment uses at most."""
 _GENTLE = 0.5
-"""Share of the joints' acceleration limits."""
+"""Share of the joints' limits of velocity and acceleration that an experiment uses at most."""
 _RATE = 100.0
 """Samples per second that a path is predicted with."""
 
@@ -88,7 +86,7 @@ class Room:
         self._space = Space(robot, self._seen, limits.box)
         middle = np.median(problem.recordings[0].joints.q, axis=0)
         self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]
-        inset = np.where(np.isfinite(robot.upper - robot.lower), _INSET, 0.0)
+        inset = np.where(np.isfinite(robot.upper - robot.lower), STEP, 0.0)
         self.low = np.maximum(np.minimum(self.home - _WIDE, q.min(axis=0)), robot.lower + inset)
         self.high = np.minimum(np.maximum(self.home + _WIDE, q.max(axis=0)), robot.upper - inset)
         self.low = np.minimum(self.low, self.home)
@@ -152,7 +150,7 @@ class Room:
         """Return the motion from stop to stop, (n,), at rest at each, at a share of fastest."""
         robot = self._robot
         fastest, hardest = robot.max_velocity, robot.max_acceleration
-        fast = _FASTEST * speed * np.where(np.isfinite(fastest), fastest, 1.0)
+        fast = _GENTLE * speed * np.where(np.isfinite(fastest), fastest, 1.0)
         hard = _GENTLE * np.where(np.isfinite(hardest), hardest, 5.0)
         pieces = [np.asarray(stops[0])[None]]
         for start, end in pairwise(stops):
@@ -190,7 +188,7 @@ def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
     q = np.concatenate([r.joints.q for r in problem.recordings])
     middle = (q.min(axis=0) + q.max(axis=0)) / 2.0
     half = np.maximum(_REACH / 2.0 * np.ptp(q, axis=0), _LEAST)
-    inset = np.where(np.isfinite(robot.upper - robot.lower), _INSET, 0.0)
+    inset = np.where(np.isfinite(robot.upper - robot.lower), STEP, 0.0)
     low = np.maximum(middle - half, robot.lower + inset)
     high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)
     return np.asarray(low), np.asarray(high)

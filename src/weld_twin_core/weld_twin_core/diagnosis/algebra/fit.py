@@ -58,8 +58,6 @@ LEAST_NOISE = 3e-5
 known of them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
 NOISE_TRUST = 8.0
 """So many rows' worth of belief in a noise that was expected."""
-KEPT = 0.05
-"""Share of the rows at the least that count as not used up by a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,8 +278,10 @@ def robust_scale(
     if freedom > 0.0:
         # As many coordinates as rows leave nothing of a noise that is there all the same.
         trust = NOISE_TRUST / size
-        sigma = float(np.sqrt((sigma**2 + trust * LEAST_NOISE**2) / (kept + trust)))
-        sigma_turn /= np.sqrt(max(kept, KEPT))
+        sigma, sigma_turn = (
+            float(np.sqrt((own**2 + trust * least_own**2) / (kept + trust)))
+            for own, least_own in ((sigma, LEAST_NOISE), (sigma_turn, LEAST_NOISE / PROBE))
+        )
     if least is not None:
         sigma, sigma_turn = max(sigma, least.position), max(sigma_turn, least.orientation)
     sigma = max(sigma, NANOMETRE)

@@ -25,22 +25,17 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.motions import narrow
 from ..algebra.problem import ROWS, Scale
 from ..beliefs import CAUSES
-from ..evidence import LIKELIER, Search, Verdict
+from ..evidence import LIKELIER, NAMED, Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part
 from ..unseen.groups import Group
 
-_TOUCHED = 4
-"""Explanations compared where contacts measured: every touch that could be made is tried with each."""
 _FORESEEN = 2.0
 """Factor within which what parts two explanations is foreseen, one standard deviation. A judgement; of
 five experiments that were to part theirs by 6 to 16 standard deviations three did."""
-NAMED, GAINED = 0.6, 0.4
-"""Share of experiments that decide, asked for by answers that name something without confidence, and
-what full confidence adds. Of 21 in development cells 19 did; two, with 0.3 and 0.55, did not."""
-_EVEN = 0.5
-"""The same where an explanation without a name is to be found by its place and dependence: too few such
-experiments were seen to promise more than an even chance."""
+_DECIDED = 0.6
+"""Share of experiments that decide, asked for by answers that name something without confidence; with
+full confidence all do. Of 21 in development cells 19 did; two, with 0.3 and 0.55, did not."""
 _ALTERNATIVES = 2
 """Other places or dependences that are compared with the one that fits best."""
 
@@ -66,7 +61,7 @@ def _touches(result: Search, verdict: Verdict) -> dict[str, Any] | None:
     if verdict.status in ('identified', 'none'):
         return None
     listed = [result.small.model.found, *_in_place(result, verdict, named=True)]
-    return next_touches(result.problem, result.final.model, listed[:_TOUCHED], result.scale)
+    return next_touches(result.problem, result.final.model, listed[:NAMED], result.scale)
 
 
 def _parting(
@@ -115,11 +110,12 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     beyond = np.log(max(sigma, FLAT) / DECIDES) / np.log(_FORESEEN)
     parted = erfc(-beyond / sqrt(2.0)) / 2.0
     if verdict.status != 'unknown':
-        return parted * (NAMED + GAINED * verdict.confidence)
+        return parted * (_DECIDED + (1.0 - _DECIDED) * verdict.confidence)
     between = chain.from_iterable(wanted['between'])
     named = all(REGISTRY[each['effect']].traits.cause for each in between)
     believed = verdict.confidence if verdict.sets else 1.0 - verdict.confidence
-    return parted * max(believed, 0.0 if named else _EVEN)
+    # Of what has no name too few such experiments were seen to promise more than an even chance.
+    return parted * max(believed, 0.0 if named else LIKELIER)
 
 
 def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[Explanation]:

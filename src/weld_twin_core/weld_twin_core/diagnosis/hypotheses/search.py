@@ -184,7 +184,7 @@ def _exchanged(result: Search, left_on: LeftOn, beliefs: Beliefs) -> Search:
         ]
         remaining = _left(result, likes, left_on)
         least = min(remaining, default=float('inf'))
-        if not likes or (1.0 + beliefs.parted) * least > left_on(result):
+        if not likes or (1.0 + beliefs.unexplained) * least > left_on(result):
             break
         better = likes[remaining.index(least)]
         tried = refitted(result, better.fit)
@@ -205,7 +205,7 @@ def _alike(
     candidate_set: CandidateSet, own: Site, remaining: dict[Site, float], beliefs: Beliefs
 ) -> CandidateSet:
     """Return a candidate set without the alternatives that leave more than the effect in the model."""
-    most = (1.0 + beliefs.parted) * min(remaining.values())
+    most = (1.0 + beliefs.unexplained) * min(remaining.values())
     if remaining.get(own, most) > most:
         return candidate_set
     kept = [one for one in candidate_set if remaining.get(one.site, most) <= most]

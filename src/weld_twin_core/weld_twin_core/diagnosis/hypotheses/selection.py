@@ -39,22 +39,10 @@ def forward(
     Several causes together may look like one that no machine has, and so may one that the library
     lacks. So the search passes it over; where such a one would still explain what is left in the end,
     all that entered after it stood in for a part of that, and goes. What looks like a machine's may
-    stand in for several, too, until what enters next drives it beyond that: then it makes room, if the
-    set that this leads to is worth more.
+    stand in for several, too, until what enters next drives it beyond that: then it makes room for good.
     """
-    gone = set[Site]()
-    made_room = _selected(work, now, most, tick, gone)
-    if not gone:
-        return made_room
-    kept = _selected(work, now, most, tick, None)
-    return max(kept, made_room, key=lambda one: work.ahead(one[0], kept[0]))
-
-
-def _selected(
-    work: Workspace, now: Fit, most: int, tick: Callable[[str], None], gone: set[Site] | None
-) -> tuple[Fit, list[Effect]]:
-    """Return what `forward` does; what made room is added to ``gone`` for good, None: nothing does."""
     doubted: tuple[Fit, list[Effect]] | None = None
+    gone = set[Site]()
     for _ in range(most):
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
@@ -64,25 +52,24 @@ def _selected(
             choice
             for choice in work.ranked(now, rows, work.beliefs.enter_log_bayes)
             if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
-            if choice.unit.site not in (gone or ())
+            if choice.unit.site not in gone
         ]
-        step = _with_best(work, now, ranked, gone is not None)
+        step = _with_best(work, now, ranked)
         if step.passed:
             doubted = doubted or (now, step.impossible)
         if step.entered is None:
             return (step.passed and doubted) or (now, step.impossible)
-        if gone is not None:
-            gone |= set(taken) - set(sites(step.fit))
+        gone |= set(taken) - set(sites(step.fit))
         now = step.fit
         tick(step.entered)
     return now, []
 
 
-def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool) -> _Step:
-    """Return the step that the best choice is; what it drives too far goes if it ``makes_room``."""
+def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
+    """Return the step that the best choice is, without what it drives beyond what machines have."""
     beliefs, impossible, passed = work.beliefs, list[Effect](), False
     while ranked:
-        slack = max(beliefs.close_log_bayes, beliefs.close_share * ranked[0].log_bayes)
+        slack = max(beliefs.close_log_bayes, beliefs.beaten_share * ranked[0].log_bayes)
         close = [c for c in ranked if c.log_bayes > ranked[0].log_bayes - slack][:SHORTLIST]
         tried = [(work.fitted_with(now.model, c.effect()), c.unit) for c in close]
         count = work.effective(min((one for one, _ in tried), key=lambda f: f.rss), beliefs.hope)
@@ -95,7 +82,7 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice], makes_room: bool
         absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
         impossible += [effect for _, effect in absurd]
         # A choice that stays within its own limits may enter: what it drives beyond theirs goes then.
-        barred = {site for site, e in absurd if not makes_room or Site.of(e) == site}
+        barred = {site for site, e in absurd if Site.of(e) == site}
         remaining = [item for item in worth if item[2].site not in barred]
         for log_bayes, one, unit in sorted(remaining, key=lambda item: -item[0]):
             best = possible(work, one, [])
@@ -146,7 +133,7 @@ def backward(work: Workspace, now: Fit) -> Fit:
     while now.model.found:
         less, count, hopeless = work.predict_without(now), work.effective(now), work.hopeless(now)
         worth = dict[int, float]()
-        most = beliefs.negligible if len(less) > 1 else beliefs.invisible
+        most = beliefs.invisible * min(len(less), 2)
         for k in (k for k, (rss, _) in enumerate(less) if rss < hopeless):
             one = work.without(now, k)
             freedom = now.coordinates.size - one.coordinates.size

@@ -118,7 +118,7 @@ def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Belief
     if not verdict.sets:
         return float(after.mean()) <= beliefs.curve_room**2 * float(before.mean())
     taken = gain(before, after, named.trusted_labels(), there.trusted_labels())
-    return taken.share >= beliefs.beaten_share and taken.steady >= beliefs.beaten_steady
+    return taken.share >= beliefs.beaten_share and taken.steady >= beliefs.steady
 
 
 def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> Verdict:
@@ -126,7 +126,7 @@ def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> 
     if verdict.status != 'none' or alternative is None:
         return verdict
     form = alternative.form
-    if form.gain < beliefs.beaten_share or form.steady < beliefs.beaten_steady:
+    if form.gain < beliefs.beaten_share or form.steady < beliefs.steady:
         return verdict
     places = ' and '.join(str(part.group) for part in form.parts)
     reason = (
@@ -134,11 +134,6 @@ def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> 
         f'{100.0 * form.gain:.0f} % of it on unseen stretches'
     )
     return replace(verdict, status='unknown', reasons=(reason,))
-
-
-ROUNDED, JUMPING = 0.6, 0.4
-"""Belief that noise from a joint is an encoder that rounds its angle, or a link that jumps as its
-direction has it, where nothing else is found there. A judgement."""
 
 
 def locate_gap(
@@ -190,8 +185,9 @@ def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
     more = []
     for one in scattered:
         if one.joint not in seen:
+            # An encoder that rounds its angle, or a link that jumps as its direction has it.
             rounded, jumping = (_bare(one.joint, on) for on in ('angle', 'direction'))
-            weights = (rounded, ROUNDED), (jumping, JUMPING)
+            weights = (rounded, 1.0 / 2.0), (jumping, 1.0 / 2.0)
             more.append(Part(rounded, 1.0, weights, one.share))
     if not more:
         return form

@@ -65,7 +65,7 @@ class FreeForm:
         return np.concatenate([np.zeros(0), *held])
 
 
-SHORT = 60
+SHORT = STRETCHES**2
 """Short stretches of which every eighth is left out together: what wanders is predicted from its
 neighbours in time, though not a minute later."""
 
@@ -171,9 +171,9 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
             break
         gain, member, errors = max(tried, key=lambda item: item[0])
         steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
-        if gain < beliefs.group_share or steady < beliefs.group_steady:
+        if gain < beliefs.unexplained or steady < beliefs.steady:
             break
-        if work.by_chance(members, gain, beliefs.group_steady):
+        if work.by_chance(members, gain, beliefs.steady):
             break
         members.append(member)
         now = errors
@@ -193,7 +193,7 @@ def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Mem
         less = [work.errors(members[:k] + members[k + 1 :]) for k in range(len(members))]
         losses = [_worst_gain(errors, now) for errors in less]
         weakest = int(np.argmin(losses))
-        if losses[weakest] >= beliefs.group_share:
+        if losses[weakest] >= beliefs.unexplained:
             break
         members = members[:weakest] + members[weakest + 1 :]
     return members

@@ -33,7 +33,7 @@ from ...effects.plausible import beyond
 from ...recording import Recording
 from ...twin.features import Features
 from ..algebra.definite import EMPTY, FLAT
-from ..algebra.independent_rows import measured_axes
+from ..algebra.independent_rows import ENOUGH, measured_axes
 from ..algebra.noise_floor import THIRD, NoiseFloor
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Scatter, Search
@@ -42,8 +42,8 @@ from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import STRETCHES, jackknife, ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 
-LEAST = 80
-"""Measurements of a recording from which on variances are estimated: ten for each fold."""
+LEAST = ENOUGH * STRETCHES
+"""Measurements of a recording from which on variances are estimated."""
 GROSS = 6.0
 """Squared length over its median from which a difference holds a stray: by chance one in 500 does."""
 

@@ -41,15 +41,14 @@ them together moves the tool by a micrometre."""
 BELIEF = np.array([0.1, 0.1, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
 """How often each size comes before anything is known of this arm. A judgement: real arms have a third
 of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
-POOLED, OWN = 3.0, 4.0
+TRUST = 4.0
 """So many coordinates' worth of belief in that, and in what all families together show, for each."""
-USUAL = 0.3
-"""Size from which on an error is one that machines usually have."""
+USUAL = SIZES[5]
+"""Size, a third of what machines have, from which on an error is one that machines usually have."""
 SWEEPS, LEARNING = 100, 20
-"""Models drawn, and those until the chain has forgotten its start: on six sealed cells means of three
-chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
-KEPT = 20
-"""Every so many models one is kept."""
+"""Models drawn, and those until the chain has forgotten where it was, of which one is kept: on six
+sealed cells means of three chains were a third of a standard deviation off that of a long one, which
+two ends agreed on."""
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
 
@@ -122,7 +121,7 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     chain, drawn = _Chain(rows, prior, expected), []
     for sweep in range(SWEEPS):
         chain.step(look=sweep >= LEARNING)
-        if sweep >= LEARNING and sweep % KEPT == 0:
+        if sweep >= LEARNING and sweep % LEARNING == 0:
             drawn.append(prior.width * chain.size)
     seen, width = chain.seen, prior.width
     mean = seen.mean / seen.count
@@ -314,10 +313,10 @@ class _Chain:
         counts = np.zeros(self.belief.shape)
         chosen = np.searchsorted(SIZES, self.size[self.counted])
         np.add.at(counts, (group[self.counted], chosen), 1.0)
-        alike = counts[group[self.hidden]] + OWN * BELIEF
+        alike = counts[group[self.hidden]] + TRUST * BELIEF
         self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
         for part in (gears, ~gears):
-            common = counts[part].sum(axis=0) + POOLED * BELIEF
-            drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
+            common = counts[part].sum(axis=0) + TRUST * BELIEF
+            drawn = self.rng.standard_gamma(counts[part] + TRUST * common / common.sum())
             drawn = np.maximum(drawn, EMPTY)
             self.belief[part] = drawn / drawn.sum(axis=1, keepdims=True)

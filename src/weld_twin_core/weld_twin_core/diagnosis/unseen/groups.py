@@ -30,15 +30,18 @@ from ...twin.memory import Picker
 from ..algebra.definite import FLAT, ROUNDING
 from ..algebra.independent_rows import ENOUGH
 from ..algebra.problem import Model, Problem, Scale
+from .folds import STRETCHES
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
 """Knots of a curve: enough for two waves of an angle, and few enough for a minute of motion."""
 FINE, LEAST_FINE = 3 * KNOTS['angle'], 400
 """Knots of a second curve over the angle, for a gear's waves; measurements from which it is tried."""
-LEAST = {'angle': 2e-3, 'direction': 0.5, 'speed': 1e-3, 'load': 0.2, 'temperature': 0.5}
-"""Span below which a quantity did not vary: angle [rad], speed [rad/s], torque [N m],
-temperature [K]. Curves over less are straight lines, and told from nothing."""
-WANDERS = 16
+NEAR = 1e-3
+"""Span below which a distance [m], an angle [rad] or a speed [rad/s] did not vary."""
+LEAST = {'angle': NEAR, 'direction': 1.0, 'speed': NEAR, 'load': 0.2, 'temperature': 0.5}
+"""The same of every quantity, of a torque [N m] and a temperature [K]. Curves over less are straight
+lines, and told from nothing."""
+WANDERS = 2 * STRETCHES
 """Times over a recording at which a lost motion may have another size: a few seconds apart."""
 LOOSE = 100.0
 """Carriers may be so many times their typical size: their group has been found by its columns."""
@@ -47,17 +50,15 @@ FIELD = 3 * 9
 """Columns of a smooth field: every coordinate over the place, up to its squares."""
 FALLEN = 3
 """Columns of a loose tool: to either side along each of its axes."""
-GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
+GAPS = np.geomspace(5e-5, 4e-2, 6)
 """Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
 what takes a tenth of a radian to build up."""
 TURNED = 1e-4
 """Travel [rad, or tens of centimetres] after which a joint counts as going the other way."""
 BENT = 4
 """Knots over the distance from the instrument, and over the angle for each way: straight or bent."""
-SHARES = (0.02, 0.1, 0.4)
+SHARES = np.geomspace(0.02, 0.4, 3)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
-NEAR = 1e-3
-"""Span of distances [m] below which there is one distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,7 +370,7 @@ def _lost(maker: Features, features: list[Features], index: int) -> Array:
     speed = view.qd[:, index]
     fastest = max(float(np.abs(m.view.qd[:, index]).max()) for m in features)
     rest = QUANTITIES['direction'](view, index)
-    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
+    about = np.tanh(speed / (SHARES[:, None] * max(fastest, LEAST['speed'])))
     shapes = [
         *trails[:-1],
         *(way * basis(knots.tolist(), view.q[:, index])),

@@ -163,7 +163,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
         return Structure(unseen.rms(unseen.whole), 0.0, 0.0, (), of_gap=of_gap)
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
-    least, certain = beliefs.dependence_gain, beliefs.dependence_sure
+    least, certain = beliefs.dependence_gain, beliefs.steady
     reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain]
     reliable = reliable[:NAMED]
     names = tuple(str(group) for _, group in reliable)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ..algebra.noise_floor import MICROMETRE
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, CandidateSet, Evidence, Left, Verdict, named_together
 from ..result import Family, Site
@@ -139,15 +140,15 @@ def _of_families(remaining: Left) -> Verdict:
     beliefs = remaining.beliefs
     families = []
     for family in remaining.evidence.families or ():
-        members = tuple(item for item in family.members if item[1] > beliefs.member_least_m)
+        members = tuple(item for item in family.members if item[1] > MICROMETRE)
         if members:
             # Joints at which it is the same error count together.
             needed = tuple(
                 (site, share)
                 for site, share in family.needed
-                if share * len(family.group(site)) >= beliefs.joint_worth
+                if share * len(family.group(site)) >= beliefs.family_worth
             )
-            like = tuple(item for item in family.like if item[1] >= beliefs.joint_worth)
+            like = tuple(item for item in family.like if item[1] >= beliefs.family_worth)
             named = family.missed(beliefs.family_worth)
             families.append(
                 replace(family, named=named, members=members, needed=needed, like=like)

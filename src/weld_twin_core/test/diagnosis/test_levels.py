@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes that no effect stands for: where they are, what they depend on, and their curve."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,10 +11,9 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.evidence import Evidence, Verdict
-from weld_twin_core.diagnosis.levels.curved import locate_gap, no_noise
+from weld_twin_core.diagnosis.evidence import Verdict
+from weld_twin_core.diagnosis.levels.curved import no_noise
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
-from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
@@ -308,28 +306,3 @@ def test_what_is_far_wider_than_noise_is_told_as_above_it():
     assert found.status == 'unknown' and found.unexplained.above_noise
     (cause,) = found.causes
     assert (cause.place[0][0], cause.dependence[0][0]) == (robot.joint_names[1], 'angle')
-
-
-def test_what_is_left_beside_a_model_has_a_place_where_no_curve_explains_the_gap():
-    rest = {('elbow', 'angle'): 0.6, ('wrist', 'angle'): 0.1}
-    evidence = Evidence(
-        candidate_sets=(),
-        structure=Structure(5e-5, 0.6, 5.0, ('angle at elbow', 'angle at wrist'), of_rest=rest),
-        gap=3e-4,
-        after=8e-5,
-        floor=2e-5,
-        independent=True,
-        parts=(),
-    )
-    form = locate_gap(
-        SimpleNamespace(dense=False), Verdict('unknown'), None, evidence, wt.Beliefs()
-    )
-    (part,) = form.parts
-    assert (form.gain, form.steady, str(part.group)) == (0.6, 5.0, 'angle at elbow')
-    # What nothing takes off may be anywhere.
-    assert part.weight_of('at') == pytest.approx({'elbow': 0.6 / 1.1, 'wrist': 0.1 / 1.1})
-    noise = replace(evidence, structure=replace(evidence.structure, gain=0.01))
-    nothing = locate_gap(
-        SimpleNamespace(dense=False), Verdict('unknown'), None, noise, wt.Beliefs()
-    )
-    assert nothing.parts == ()

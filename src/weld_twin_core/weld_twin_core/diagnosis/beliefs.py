@@ -142,5 +142,3 @@ class Beliefs:
     curve_room: float = 1.05
     """Curves are carried although effects that imitate the cause leave this much less on unseen
     stretches: they carry no parameter of an effect that is not there."""
-    level_shared: float = 0.7
-    """Belief that what several joints do alike has one cause, and not one each. A judgement."""

@@ -315,8 +315,6 @@ class Structure:
     """Share that the best of them hardly ever takes off noise alone; 0 where rows are many."""
     of_gap: Mapping[tuple[str, str], float] = field(default_factory=dict)
     """By joint and dependence: share of the squared gap, no effect fitted, that one takes off."""
-    of_rest: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    """By place and dependence: share of what is left that each of ``depends_on`` takes off."""
 
 
 @dataclass(frozen=True)

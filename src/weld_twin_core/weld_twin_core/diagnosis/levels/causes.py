@@ -59,7 +59,7 @@ def causes(
     """
     named = _claims_of_names(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
-    claims, rest = _nameless(result, named, verdict, curved, placing, beliefs)
+    claims, rest = _nameless(result, named, verdict, curved, placing)
     squares = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     parts = _contributions(unseen)
     labels = unseen.trusted_labels()
@@ -159,12 +159,11 @@ def _nameless(
     verdict: Verdict,
     curved: Curved | None,
     placing: FreeForm,
-    beliefs: Beliefs,
 ) -> tuple[list[Cause], Cause | None]:
     """Return all claims with those of curves that the model holds, and what is left beside."""
     if verdict.status != 'unknown':
         # What was found and does not count as named is left, and nothing else says where it sits.
-        return named, _rest([], beliefs) if len(named) < len(result.candidate_sets) else None
+        return named, _rest([]) if len(named) < len(result.candidate_sets) else None
     model = result.final.model.found
     places = _by_place(placing.parts)
     curves_at = _curves_by_place(places, curved) if places else {}
@@ -173,7 +172,7 @@ def _nameless(
     if taken_out := result.lacking:
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
         stand_in = _stand_in(taken_out[0], beside, model)
-        return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)
+        return ([*claims, stand_in], _rest([])) if beside else (claims, stand_in)
     by_curves = {at for members in curves_at.values() for at in members}
     for k, effect in enumerate(model if curved is not None else ()):
         if k in taken | by_curves or effect.traits.bends:
@@ -189,10 +188,10 @@ def _nameless(
             remaining += own
             continue
         curves = {Site.of(model[k]): 1.0 for k in curves_at[place] if k in by_curves}
-        levels = _place_of(place, own, beliefs), _dependence_of(own), curves
+        levels = _place_of(own), _dependence_of(own), curves
         share = float(sum(part.share for part in own))
         claims.append(_cause(curves_at[place], *levels, share=share))
-    return claims, _rest(remaining, beliefs)
+    return claims, _rest(remaining)
 
 
 def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> Cause:
@@ -201,14 +200,13 @@ def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> C
     return _cause(members, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
 
 
-def _rest(remaining: list[Part], beliefs: Beliefs) -> Cause:
+def _rest(remaining: list[Part]) -> Cause:
     """Return what is left beside everything reported, where the most of it is."""
     if not remaining:
         return _cause((), {}, {}, {})
     places = _by_place(remaining)
-    first = max(places, key=lambda at: sum(part.share for part in places[at]))
-    own = places[first]
-    return _cause((), _place_of(first, own, beliefs), _dependence_of(own), {})
+    own = max(places.values(), key=lambda parts: sum(part.share for part in parts))
+    return _cause((), _place_of(own), _dependence_of(own), {})
 
 
 def _curves_by_place(
@@ -219,23 +217,17 @@ def _curves_by_place(
     if alternative is None:
         return out
     largest = max(places, key=lambda place: sum(part.share for part in places[place]))
-    # Joints that were put under one cause bring their curves along.
-    owner = {part.group.at: place for place, parts in places.items() for part in parts}
     at = len(alternative.kept)
     for part in alternative.form.parts:
         members = tuple(range(at, at + len(part.group.movable_curves)))
-        out[owner.get(part.group.at, largest)] += members
+        out[part.group.at if part.group.at in out else largest] += members
         at += len(members)
     return out
 
 
-def _place_of(place: str, parts: list[Part], beliefs: Beliefs) -> dict[str, float]:
+def _place_of(parts: list[Part]) -> dict[str, float]:
     """Return what is believed of the place of some parts, by the one that does most."""
-    shared = beliefs.level_shared
-    weights = max(parts, key=lambda part: part.share).weight_of('at')
-    if place in weights:
-        return weights
-    return {place: shared, **{at: w * (1.0 - shared) for at, w in weights.items()}}
+    return max(parts, key=lambda part: part.share).weight_of('at')
 
 
 def _dependence_of(parts: list[Part]) -> dict[str, float]:
@@ -250,19 +242,10 @@ def _dependence_of(parts: list[Part]) -> dict[str, float]:
 
 
 def _by_place(parts: Sequence[Part]) -> dict[str, list[Part]]:
-    """Return the parts at each place; joints that all depend on the load, or lag, are one cause."""
+    """Return the parts at each place."""
     out: dict[str, list[Part]] = {}
     for part in parts:
         out.setdefault(part.group.at, []).append(part)
-    for on, together, least in (('load', 'load', 2), ('speed', 'clock', 3)):
-        joints = [
-            place
-            for place, own in out.items()
-            if place != together and all(part.group.on == on for part in own)
-        ]
-        if len(joints) >= least or (joints and together in out):
-            alike = [part for place in joints for part in out.pop(place)]
-            out[together] = [*out.get(together, ()), *alike]
     return out
 
 

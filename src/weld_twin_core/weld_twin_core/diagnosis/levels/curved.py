@@ -14,8 +14,8 @@ from ...recording import Recording
 from ..algebra.fit import fit, robust_fit
 from ..algebra.problem import ROWS
 from ..beliefs import Beliefs
-from ..evidence import Evidence, Left, Scatter, Search, Verdict
-from ..result import NAMING, Shrink, Site, Structure
+from ..evidence import Evidence, Scatter, Search, Verdict
+from ..result import NAMING, Shrink, Site
 from ..unseen.folds import gain
 from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
@@ -146,8 +146,7 @@ def locate_gap(
     """
     Return the groups that tell place and dependence of an unknown gap; of any other nothing.
 
-    They explain what is left beside all that is reported: without a free-form explanation what was
-    found to be left beside the model, and joints that noise comes from.
+    They explain what is left beside all that is reported, and joints that noise comes from.
     """
     if verdict.status != 'unknown':
         return FreeForm(())
@@ -157,21 +156,7 @@ def locate_gap(
         form = free_form(result.problem, result.scale, bare, beliefs)
     else:
         form = FreeForm(()) if alternative is None else alternative.form
-    if not form.parts and Left(evidence, beliefs).structured:
-        form = _of_structure(evidence.structure)
     return _with_scatter(form, evidence.scattered)
-
-
-def _of_structure(structure: Structure) -> FreeForm:
-    """Return what is left beside the model as one part; whatever nothing takes off may be elsewhere."""
-    shares = structure.of_rest
-    if not shares:
-        return FreeForm(())
-    whole = sum(shares.values()) + 1.0 - max(shares.values())
-    weights = [(_bare(at, on), share / whole) for (at, on), share in shares.items()]
-    first, _ = max(weights, key=lambda item: item[1])
-    part = Part(first, 1.0, tuple(weights), structure.gain)
-    return FreeForm((part,), structure.gain, structure.sure)
 
 
 def _bare(at: str, on: str) -> Group:

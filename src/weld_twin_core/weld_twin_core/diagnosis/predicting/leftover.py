@@ -31,9 +31,7 @@ from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen
 from .sizes import SIZES, Products
 
-QUARTER = 0.25
-"""Step of shares and parts that are tried; finer ones fit hardly better."""
-SHARES = np.arange(0.0, 1.0, QUARTER).tolist()
+SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 """Shares of what is left over that may come from the gears; never all, for tools shake too."""
 ROUGH = 0.5
 """Share of small errors of a usual size from which on all that is left is the arm's. A judgement: of two
@@ -49,7 +47,7 @@ MOST = 800
 """Samples that tell what is left over; more say the same."""
 LONE = 3.0
 """Log odds against what is left coming from one gear alone, beside which one it is: a judgement."""
-PARTS = np.arange(QUARTER, 2.0, QUARTER).tolist()
+PARTS = (0.25, 0.5, 0.75, 1.0, 1.5)
 """Parts of the errors' own covariance that an instrument may leave."""
 CERTAIN = 5.0
 """Log likelihood by which levers must explain what is left better than an instrument does."""

@@ -46,9 +46,10 @@ TRUST = 4.0
 USUAL = SIZES[5]
 """Size, a third of what machines have, from which on an error is one that machines usually have."""
 SWEEPS, LEARNING = 100, 20
-"""Models drawn, and those until the chain has forgotten where it was, of which one is kept: on six
-sealed cells means of three chains were a third of a standard deviation off that of a long one, which
-two ends agreed on."""
+"""Models drawn, and those until the chain has forgotten where it was: on six sealed cells means of three
+chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
+KEPT = LEARNING
+"""Every so many models one is kept: it has forgotten the one before."""
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
 
@@ -121,7 +122,7 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     chain, drawn = _Chain(rows, prior, expected), []
     for sweep in range(SWEEPS):
         chain.step(look=sweep >= LEARNING)
-        if sweep >= LEARNING and sweep % LEARNING == 0:
+        if sweep >= LEARNING and sweep % KEPT == 0:
             drawn.append(prior.width * chain.size)
     seen, width = chain.seen, prior.width
     mean = seen.mean / seen.count

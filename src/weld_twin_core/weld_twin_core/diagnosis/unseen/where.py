@@ -164,10 +164,8 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.steady
-    reliable = [(one, g) for one, g in found if one.share > least and one.steady > certain]
-    reliable = reliable[:NAMED]
-    names = tuple(str(group) for _, group in reliable)
-    of_rest = {(group.at, group.on): one.share for one, group in reversed(reliable)}
+    reliable = [g for one, g in found if one.share > least and one.steady > certain]
+    names = tuple(map(str, reliable[:NAMED]))
     chance = 0.0
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
     if counts and may_be_chance(unseen.residual.size, best.share):
@@ -176,7 +174,7 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
         columns = unseen.columns.written_out()
         tried = Candidates(columns, unseen.precision, each, RIDGES, [unseen.labels])
         chance = chance_gain(tried, beliefs.blatant_sure)
-    return Structure(best.rms_m, best.share, best.steady, names, chance, of_gap, of_rest)
+    return Structure(best.rms_m, best.share, best.steady, names, chance, of_gap)
 
 
 def _tells(group: Group, joints: Collection[str], named: Collection[str]) -> bool:

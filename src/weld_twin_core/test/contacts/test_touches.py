@@ -63,7 +63,7 @@ def test_three_touches_of_a_pin_tell_the_elbow_offset():
 
 def test_what_is_left_of_touches_depends_on_joints_alone(monkeypatch):
     """No instrument measured that could err from place to place, and a touch has no time."""
-    monkeypatch.setattr(where, 'MOST_DEPENDENCES', 99)
+    monkeypatch.setattr(where, 'NAMED', 99)
     postures = np.random.default_rng(1).uniform(0.5, 0.9, (24, 2))
     problem, model = aligned(touching(two_links(), postures, ['a', 'b'] * 12), two_links(), '', ())
     scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))

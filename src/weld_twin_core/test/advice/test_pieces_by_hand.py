@@ -185,7 +185,7 @@ def test_a_way_that_is_not_free_leads_by_home_and_one_joint_alone_goes_as_far_as
     room._ways = lambda start, end: start[:, 0] * end[:, 0] > 0.0
     expected = [q[0], q[1], home, q[2], home, q[3]]
     np.testing.assert_array_equal(Room.linked(room, q), expected)
-    for most, share in ((2.0, 1.0), (0.8, 0.5), (0.01, 0.1)):
+    for most, share in ((2.0, 1.0), (0.8, 0.5), (0.01, 0.125)):
         room.way = lambda stops, most=most: np.abs(stops).max() <= most
         high, low = share * room.high[0], share * room.low[0]
         expected = [home, [high, 0.0], [low, 0.0], home]

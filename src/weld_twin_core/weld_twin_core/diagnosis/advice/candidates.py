@@ -34,7 +34,7 @@ LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
-_HALVED = tuple(2.0 ** -np.arange(3.0))
+_HALVED = tuple(2.0 ** -np.arange(4))
 """Speeds of paths, as shares of the fastest, and shares of a range."""
 _LONGEST = 40.0
 """Time [s] of a recorded seam that is run again, backward or slower: half the least experiment."""
@@ -114,7 +114,7 @@ class _Here:
                 at += 1
             if len(stops) > 1:
                 # Back the same way: every place is passed in both directions.
-                motions.append(room.travel([*stops, *stops[-2::-1]], _HALVED[k % len(_HALVED)]))
+                motions.append(room.travel([*stops, *stops[-2::-1]], _HALVED[k % 3]))
         motions += _retraced(self.problem, room)
         together = len(motions)
         for name in list(dict.fromkeys(joints))[:NAMED]:

@@ -222,7 +222,7 @@ IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
         ('rapid', 'TTORCH := tOther;\n', 'set anew'),
         ('urscript', f'F = p[0,0,0.1,0,0,0]\nF[2] = 0.3\n{IN_FRAME}', 'worked out'),
         ('urscript', f'F = p[0,0,0.1,0,0,0]\nF = pose_add(F, F)\n{IN_FRAME}', 'worked out'),
-        ('urscript', 'T = p[0,0,0.1,0,0,0]\nT[2] = 0.3\nset_tcp(T)\n', 'the numbers of tool T'),
+        ('urscript', 'T = p[0,0,0.1,0,0,0]\nT[2] = 0.3\nset_tcp(T)\n', 'numbers of T are set'),
         (
             'urscript',
             'movej(get_inverse_kin(Waypoint_1_p, Start_q, tcp=p[0,0,1,0,0,0]))\n',
@@ -586,6 +586,38 @@ def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     program = read('rapid', (source,), 'abb_irb1600')
     moves = [move for piece in to_moves(program, robot, own).pieces for move in piece]
     assert {move.kind for move in moves} == {'unknown'}
+
+
+@pytest.mark.parametrize(
+    ('language', 'tool', 'reason'),
+    [
+        ('krl', '$TOOL = TOOL_DATA[1]', ''),
+        ('krl', '$TOOL = TORCH', ''),
+        ('krl', '$TOOL = TOOL_DATA[I]', 'worked out'),
+        ('krl', 'BAS(#TOOL, I)', 'worked out'),
+        ('krl', '$TOOL = TOOL_DATA[1]:WEAR', 'worked out'),
+        ('krl', 'TORCH = BARE:WEAR\n$TOOL = TORCH', 'are set at file0 line 2'),
+        ('rapid', 'tTorch', ''),
+        ('rapid', 'tTorches{i}', 'worked out'),
+        ('rapid', 'CTool()', 'worked out'),
+        ('rapid', 'tSet', 'are set at file0 line'),
+        ('urscript', 'set_tcp(TCP_1)', ''),
+        ('urscript', 'set_tcp(tcps[i])', 'worked out'),
+        ('urscript', 'T = tool_of(2)\nset_tcp(T)', 'are set at file0 line 2'),
+    ],
+)
+def test_a_tool_that_is_worked_out_is_not_that_of_the_robot_file(language, tool, reason):
+    text = {
+        'krl': f'DEF a()\n{tool}\n$BASE = $NULLFRAME\n{KRL_MOVE}\nEND\n',
+        'rapid': RAPID_SEAM.partition('sub;')[0]
+        + f'tSet := tOther;\nMoveL p1,v9,fine,{tool};\nENDPROC\nENDMODULE\n',
+        'urscript': f'def a():\n{tool}\n{UR_MOVE}\nend\n',
+    }[language]
+    robot = wt.load(PROGRAMS[language][0])
+    torch = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, 0.2]))
+    own = controller_of(robot.with_frames(tool=torch), language)
+    *_, move = to_moves(read(language, (text,), PROGRAMS[language][0]), robot, own).pieces[-1]
+    assert (move.kind == 'unknown') == bool(reason) and reason in move.why
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,10 @@ class Cell(NamedTuple):
     """Where the robot's rows begin in the world of the controller, shape (4, 4) [m]."""
 
 
+_PLAIN = re.compile(r'[A-Za-z_$]\w*|\d+')
+"""A name or number of a tool, such as the controller has numbers for."""
+
+
 class Frame(NamedTuple):
     """A tool or base frame as a program names it."""
 
@@ -170,6 +174,10 @@ class Controller:
             raise DataError(frame.why + _ask(frame, '--tool'))
         if not frame.name:
             return self.own_tool
+        if not _PLAIN.fullmatch(frame.name):
+            raise DataError(
+                f'tool {frame.name} is worked out when the program runs' + _ask(frame, '--tool')
+            )
         if np.abs(self.own_tool[:3, 3] - self.flange[:3, 3]).max() < 1e-9:
             raise DataError(
                 f'the numbers of tool {frame.name} are not in the program, and the robot file has '

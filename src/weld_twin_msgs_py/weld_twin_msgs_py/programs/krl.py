@@ -321,6 +321,8 @@ class KrlReader(Reader):
                 )
             elif where := self._again(value):
                 named = Frame(named.name, why=f'the numbers of {value} are set anew at {where}')
+            elif frame is None and not named.moving:
+                named = self.named(named.name, value.lower())._replace(moving=named.moving)
             self._use(*((None, named) if what[:5] == '$BASE' else (named, None)))
         elif what == '$IPO_MODE':
             self.state.shift = MOVING if value.upper() == '#BASE' else STILL
@@ -371,10 +373,11 @@ class KrlReader(Reader):
         if text.strip() == '0':
             return Frame('', np.eye(4))
         key = f'{what}_DATA[{text.strip()}]'
+        name = _bare(key) or key
         if where := self._again(key):
-            return Frame(text.strip(), why=f'the numbers of {key} are set anew at {where}')
+            return Frame(name, why=f'the numbers of {key} are set anew at {where}')
         # Numbered bases of an external kinematic system are taken as such by the controller alone.
-        return Frame(text.strip(), self.frames.get(key), None if what == 'BASE' else False)
+        return Frame(name, self.frames.get(key), None if what == 'BASE' else False)
 
     def _frame_at(self, file: int, start: int, end: int) -> Array | None:
         """Return the frame that a piece of text stands for; None where it is worked out."""
@@ -496,8 +499,8 @@ class KrlReader(Reader):
 
 
 def _bare(text: str) -> str:
-    """Return the number of ``TOOL_DATA[1]``, as a user would name it."""
-    result = re.fullmatch(r'(?:TOOL|BASE)_DATA\s*\[\s*(\w+)\s*\]', text.strip(), re.I)
+    """Return the number of ``TOOL_DATA[1]``, as a user would name it; none of one worked out."""
+    result = re.fullmatch(r'(?:TOOL|BASE)_DATA\s*\[\s*(\d+)\s*\]', text.strip(), re.I)
     return result[1] if result else ''
 
 

@@ -455,8 +455,8 @@ class RapidReader(Reader):
         wobj = re.search(r'\\WObj\s*:=\s*([A-Za-z]\w*)', self.text[cut:end], re.I)
         base = 'wobj0' if wobj is None else wobj[1]
         return (
-            self.tools.get(tool.lower(), Frame(tool)),
-            self.bases.get(base.lower(), Frame(base)),
+            self.tools.get(tool.lower()) or self.named(tool, tool.lower()),
+            self.bases.get(base.lower()) or self.named(base, base.lower()),
         )
 
     def _travel(self, kind: Kind, parts: Sequence[tuple[int, int]], at: int) -> tuple[float, bool]:

@@ -46,6 +46,8 @@ class Reader(ABC):
         self.text = self.texts[0]
         self.program = Program('', self.sources)
         self.again: dict[str, str] = {}
+        self.assigned: dict[str, str] = {}
+        """Where the program itself sets what has a name, of which it may say no numbers."""
         self.shift = Frame('')
         """Why moves go elsewhere than their points say, where the text is read."""
         self.routines = 0
@@ -139,6 +141,7 @@ class Reader(ABC):
             for match in pattern.finditer(text):
                 name = re.sub(r'\s', '', match[1])
                 name = name.lower() if pattern.flags & re.IGNORECASE else name
+                self.assigned.setdefault(name, source.where(match.start(1)))
                 if match[2] or name in whole:
                     out.setdefault(name, source.where(match.start(1)))
                 whole.add(name)
@@ -150,6 +153,11 @@ class Reader(ABC):
             for match in pattern.finditer(text):
                 out.setdefault(re.sub(r'\s', '', match[1]).lower(), source.where(match.start(1)))
         return out
+
+    def named(self, name: str, key: str) -> Frame:
+        """Return a frame of which the program has no numbers, unless it works them out itself."""
+        where = self.assigned.get(key, '')
+        return Frame(name, why=where and f'the numbers of {name} are set at {where}')
 
     def numbered_set(self, pattern: re.Pattern[str]) -> None:
         """Take in where a frame of a table (first group) and number (second), or of any, is set."""

@@ -181,9 +181,8 @@ class UrscriptReader(Reader):
             value = self._frame(*first)
         except DataError:
             value = None
-        return Frame(
-            self.source.text[slice(*first)] or 'of set_tcp' if value is None else '', value
-        )
+        text = self.source.text[slice(*first)]
+        return self.named(text or 'of set_tcp', text) if value is None else Frame('', value)
 
     def _move(self, word: str, where: str, start: int, end: int) -> None:
         kind, order = MOVES[word]

@@ -12,9 +12,11 @@ from command_line import done, refused, weld_twin
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
+from weld_twin_core.twin.compensation import beyond_limits
 from weld_twin_lab.programs import plain as readers
 from weld_twin_lab.programs.plain import along, joints_for, tool_pose
 from weld_twin_msgs_py.robots import write_robot_yaml
+from weld_twin_nodes.offline import correcting
 
 MADE = Path(__file__).parent / 'made'
 CELLS = {
@@ -191,6 +193,61 @@ SEAM = """def seam():
   movej([0.1, -1.3, 2.5, -1.8, -1.5, 0.0])
 end
 """
+
+
+def test_a_model_that_is_replaced_while_a_program_is_corrected_is_refused(tmp_path, monkeypatch):
+    made = correcting.corrected_program
+
+    def meanwhile(*args, **words):
+        (tmp_path / 'found.yaml').write_text('[]\n')
+        return made(*args, **words)
+
+    monkeypatch.setattr(correcting, 'corrected_program', meanwhile)
+    said = corrected(tmp_path, SEAM)
+    assert said.code == 2 and "found.yaml' was changed while it was read" in said.err
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize(('apart', 'calm'), [(0.05, False), (0.002, True)])
+def test_play_asks_for_no_leap_that_a_joint_cannot_make_between_timed_points(
+    apart, calm, tmp_path
+):
+    robot, width = wt.load('ur5'), 1e-3
+    (tmp_path / 'found.yaml').write_text(
+        f'- {{effect: backlash, joint: elbow_joint, width: {width}}}\n'
+        '- {effect: joint_offset, joint: shoulder_lift_joint, offset: 8e-4}\n'
+    )
+    t = apart * np.arange(24)
+    q = np.tile([0.17, -1.39, 1.65, -1.83, -1.57, 0.08], (t.size, 1))
+    q[:, 2] += 0.01 * np.sin(np.pi * t / t[-1])
+    stamps = np.round(1e9 * t).astype(int).tolist()
+    points = [
+        {'positions': row, 'time_from_start': {'sec': ns // 10**9, 'nanosec': ns % 10**9}}
+        for ns, row in zip(stamps, q.tolist(), strict=True)
+    ]
+    text = json.dumps({'joint_names': robot.joint_names, 'points': points})
+    (tmp_path / 'plan.json').write_text(text)
+    words = ('--robot', 'ur5', '--model', tmp_path / 'found.yaml', '--out', tmp_path / 'out')
+    said = done('correct', tmp_path / 'plan.json', *words)
+    assert ('rad/s^2 between these points, and the robot file allows 15' in said) is calm
+    made = json.loads((tmp_path / 'out' / 'plan.json').read_text())['points']
+    moved = np.array([point['positions'] for point in made]) - q
+    assert np.ptp(moved[:, 2]) == pytest.approx(0.0 if calm else width, abs=0.01 * width)
+
+
+def test_commands_that_leap_by_play_are_told(tmp_path):
+    (tmp_path / 'found.yaml').write_text('- {effect: backlash, joint: elbow_joint, width: 1e-3}\n')
+    words = ('--robot', 'ur5', '--path', 'spline', '--profile', 'aggressive', '--rate', '250')
+    done('simulate', *words, '--out', tmp_path / 'bag')
+    words = ('--robot', 'ur5', '--model', tmp_path / 'found.yaml', '--out', tmp_path / 'out')
+    said = done('correct', tmp_path / 'bag', *words)
+    assert 'the correction alone would ask elbow_joint for' in said
+    # By hand: a step of 1 mrad within 4 ms takes 0.25 rad/s, and to come to that 62.5 rad/s^2.
+    robot, shift = wt.load('ur5'), np.zeros((5, 6))
+    shift[2:, 2] = 1e-3
+    leaps = beyond_limits(robot, shift, np.full(4, 4e-3))
+    assert list(leaps) == [0, 1] and 'elbow_joint for 62.5 rad/s^2' in leaps[0]
+    assert not beyond_limits(robot, shift, np.full(4, 1e-2))
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,30 @@ def compensate(
     return Compensation(motion, -before, -after, left_out)
 
 
+def beyond_limits(robot: Robot, shift: Array, dt: Array) -> dict[int, str]:
+    """
+    Return the steps at which a correction in itself asks a joint for more than its limits, and how.
+
+    shift: what is added to joint positions, (N, n) [rad, m]; a step of play, most of all.
+    dt: from each to the next, (N - 1,) [s].
+    """
+    out: dict[int, str] = {}
+    rate = np.diff(shift, axis=0) / dt[:, None]
+    gain = np.diff(rate, axis=0) / (0.5 * (dt[1:] + dt[:-1]))[:, None]
+    for values, power, limit in (
+        (np.abs(rate), '', robot.max_velocity),
+        (np.abs(gain), '^2', robot.max_acceleration),
+    ):
+        for k, joint in np.argwhere(values > limit):
+            unit = f'{"m" if robot.prismatic[joint] else "rad"}/s{power}'
+            out.setdefault(
+                int(k),
+                f'the correction alone would ask {robot.joint_names[joint]} for {values[k, joint]:.3g} '
+                f'{unit} between these points, and the robot file allows {limit[joint]:.3g}',
+            )
+    return out
+
+
 def _solved(real: Twin, recording: Recording, goal: Array, rounds: int) -> Array:
     """Return the joint positions, shape (N, n), that put the real tool where it is to be."""
     motion = recording.joints

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arm.chain import chain_jacobian, forward, frames
+from ..arm.robot import Robot
 from ..arm.rotation import missing
 from ..arm.rotation import moved as displaced
 from ..arrays import Array
@@ -31,6 +32,7 @@ from ..motion.inverse.newton import least_step
 from ..motion.programs import Move, MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.travel import finer, refined, repeated, unrelenting
 from ..recording import JointMotion
+from .compensation import beyond_limits
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
 
@@ -204,11 +206,11 @@ class _Work(NamedTuple):
                 for move in piece.moves:
                     out.setdefault(move.seam, f'{move.where}: {error}')
                 continue
+            hard = _too_hard(self.model.robot, piece, motion)
             shares = self._trust(piece)
             for k, move in enumerate(piece.moves):
-                why = self._why_not(moved, piece, k, shares) or _wound(
-                    move, *(each.q[piece.ends[k]] for each in (piece.motion, motion))
-                )
+                ends = (each.q[piece.ends[k]] for each in (piece.motion, motion))
+                why = hard.get(k) or self._why_not(moved, piece, k, shares) or _wound(move, *ends)
                 if why:
                     out.setdefault(move.seam, f'{move.where}: {why}')
         return {seam: why for seam, why in out.items() if seam not in remaining}
@@ -337,6 +339,15 @@ class _Work(NamedTuple):
             by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
             out.append(_MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
         return tuple(out)
+
+
+def _too_hard(robot: Robot, piece: Piece, motion: JointMotion) -> dict[int, str]:
+    """Return the moves between timed points where a correction is beyond limits, and how."""
+    dt = np.array([move.duration for move in piece.moves[1:]])
+    if not dt.size or dt.min() <= 0.0:
+        return {}
+    leaps = beyond_limits(robot, (motion.q - piece.motion.q)[piece.ends], dt)
+    return {k + 1: why for k, why in leaps.items()}
 
 
 def _wound(move: Move, before: Array, after: Array) -> str:

@@ -292,15 +292,28 @@ def quantity(text: str, units: Sequence[str], option: str) -> float:
 
 
 def inputs_of(**files: str | Sequence[str]) -> list[InputFile]:
-    """Return the hashes of what a result comes from, by use; a name that is no file has none."""
+    """
+    Return the hashes of what a result comes from, by use, to be taken before it is read.
+
+    A name that is no file has none, and what is not there is refused by whoever reads it.
+    """
     from weld_twin_msgs_py.files.input_files import hashed
 
     return [
         hashed(use.replace('_', ' '), path)
         for use, paths in files.items()
         for path in ([paths] if isinstance(paths, str) else paths)
-        if path and (use != 'robot' or Path(path).is_file())
+        if path and (Path(path).is_file() or (use != 'robot' and Path(path).exists()))
     ]
+
+
+def refuse_changed(inputs: Sequence[InputFile]) -> None:
+    """Refuse inputs that were replaced while they were read: a result must name what it is of."""
+    from weld_twin_msgs_py.files.input_files import hashed
+
+    for one in inputs:
+        if hashed(one.use, one.path) != one:
+            raise DataError(f"'{one.path}' was changed while it was read; run the command again")
 
 
 def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:

@@ -19,7 +19,7 @@ from weld_twin_core.effects.dated import left_behind
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.compensation import Compensation, compensate
+from weld_twin_core.twin.compensation import Compensation, beyond_limits, compensate
 from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.posterior import (
@@ -276,6 +276,20 @@ def write_compensated(
         storage=storage,
         provenance={COMPENSATED: [effect.to_mapping() for effect in twin.effects]},
         beside=beside_bag(made.model, made.outside),
+    )
+
+
+def leap_sentence(robot: Robot, made: Compensated, recording: Recording) -> str:
+    """Return where a correction leaps as no joint can, such as by play; empty where it does not."""
+    joints = recording.joints
+    shift, dt = made.motion.q - joints.q, np.diff(joints.t)
+    leaps = {} if joints.static else beyond_limits(robot, shift, dt)
+    if not leaps:
+        return ''
+    first = next(iter(leaps))
+    return (
+        f'at {joints.t[first]:.3f} s {leaps[first]}, and so at {len(leaps)} places in all; thin the '
+        'commands out, or send them through the compensator, which spreads such a step'
     )
 
 

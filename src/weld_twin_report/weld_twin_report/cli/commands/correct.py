@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Correct a robot program, or the joint commands of a bag."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.program_correction import Caps
 from weld_twin_msgs_py.bags import provenance
+from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.programs import Context, Program, read_program
 from weld_twin_msgs_py.programs.languages import corrected_twice, language_of, programs_beside
 from weld_twin_msgs_py.programs.source import read_source
-from weld_twin_nodes.cli.given import Given, inputs_of, quantity, say_doubts
+from weld_twin_nodes.cli.given import Given, inputs_of, quantity, refuse_changed, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
 from weld_twin_nodes.offline.given_twin import changed_robot, diagnosis_of, other_readings
@@ -25,6 +27,7 @@ NOISE = '0.03mm'
 LARGEST = ('2mm', '1deg')
 """How far a point may be moved unless given: more is no inaccuracy of an arm, but a mistake."""
 BAGS = ('.mcap', '.db3')
+_Inputs = Sequence[InputFile]
 
 
 def run(given: Given) -> int:
@@ -81,6 +84,8 @@ def _corrected_bag(given: Given) -> int:
     )
     for sentence in prediction.trust_sentences(made):
         print(sentence)
+    if leap := prediction.leap_sentence(robot, made, recording):
+        print(f'note: {leap}')
     if made.result.left_out:
         names = ', '.join(effect.name for effect in made.result.left_out)
         print(f'joint commands cannot mend {names}')
@@ -89,13 +94,14 @@ def _corrected_bag(given: Given) -> int:
 
 def _corrected_program(given: Given) -> int:
     """Read, correct, write; say what is expected."""
+    inputs = inputs_of(program=given.program, model=given.model)
     robot = given.load_robot()
     language = language_of(read_source(given.program), given.program, given.controller)
     context = given.program_context(robot, language, given.model)
     context = context._replace(beside=programs_beside(given.program, language))
     program = read_program(given.program, context, language)
     if given.model:
-        return _by_model(given, context, program)
+        return _by_model(given, context, program, inputs)
     entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
     texts = {source.name: source.text.encode('latin-1') for source in program.sources}
     given.write_results(RESULT, '', entry | {'language': language, 'model': None}, texts.items())
@@ -103,7 +109,7 @@ def _corrected_program(given: Given) -> int:
     return 0
 
 
-def _by_model(given: Given, context: Context, program: Program) -> int:
+def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs) -> int:
     from weld_twin_nodes.offline import correcting
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
@@ -125,7 +131,7 @@ def _by_model(given: Given, context: Context, program: Program) -> int:
         tolerance = _length(given.tolerance, '--tolerance')
         noise = _length(given.noise or NOISE, '--noise')
         entry['tolerance'] = correcting.tolerance_entry(made, model, tolerance, noise)
-    inputs = inputs_of(program=given.program, model=given.model)
+    refuse_changed(inputs)
     entry['inputs'] = [item.as_dict() for item in inputs]
     names = (source.name for source in program.sources)
     texts = zip(names, (text.encode('latin-1') for text in made.texts), strict=True)

@@ -25,7 +25,15 @@ from weld_twin_core.diagnosis.frames.changes import families_named
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.artefact_file import read_artefact
-from weld_twin_nodes.cli.given import PAGE, Given, inputs_of, refuse_unknown_effect, twin_of
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.cli.given import (
+    PAGE,
+    Given,
+    inputs_of,
+    refuse_changed,
+    refuse_unknown_effect,
+    twin_of,
+)
 from weld_twin_nodes.offline.set_up_changes import SetUpChange, set_up_change, with_changes
 
 from ...report import print_summary
@@ -68,13 +76,13 @@ def run(given: Given) -> int:
     """Diagnose, write the results, print the verdict."""
     sheet = _sheet(given)
     with given.output(RESULT) as place:
-        diagnosis = _diagnosis(given)
         inputs = inputs_of(
             recording=given.bag,
             held_out=given.holdout,
             robot=given.robot,
             effects_known=given.effects_known,
         )
+        diagnosis = _diagnosis(given, inputs)
         write_results(place, diagnosis, inputs, given.find_urdf(), sheet)
         if given.pdf:
             print_page(place / PAGE, place / PDF)
@@ -84,7 +92,7 @@ def run(given: Given) -> int:
     return UNSOUND if diagnosis.status == 'unsound' else 0
 
 
-def _diagnosis(given: Given) -> Diagnosis:
+def _diagnosis(given: Given, inputs: Sequence[InputFile]) -> Diagnosis:
     from weld_twin_nodes.offline.region import region
 
     align = frames_named(given.align, '--align')
@@ -98,6 +106,7 @@ def _diagnosis(given: Given) -> Diagnosis:
     judged = region(twin.robot, given.region)[0] if given.region else None
     with _progress() as tell:
         recordings = _read(given, twin.robot, 'base' in align, tell)
+        refuse_changed(inputs)
         count = len(given.bag)
         fitted, more = with_changes(_bounded(recordings[:count]), changes, twin.robot)
         result = diagnose(

@@ -10,7 +10,7 @@ from rich.table import Table
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.algebra.problem import frames_named
 from weld_twin_core.metrics.performance import Performance, performance_of
-from weld_twin_nodes.cli.given import Given, inputs_of
+from weld_twin_nodes.cli.given import Given, inputs_of, refuse_changed
 from weld_twin_nodes.offline.placed_robot import placed
 
 from ...report import performance_page as words
@@ -25,13 +25,14 @@ FAR = 0.1
 
 def run(given: Given) -> int:
     """Find the cycles, evaluate them, write the results, print a table."""
+    inputs = inputs_of(recording=given.bag, robot=given.robot)
     nominal = given.load_robot()
     align = frames_named(given.align, '--align')
     recording = given.read_bag(given.bag, nominal)
     robot, notes = placed(recording, nominal, align)
     result = performance_of(recording, robot)
     notes += _warnings(result, align)
-    inputs = inputs_of(recording=given.bag, robot=given.robot)
+    refuse_changed(inputs)
     content = {
         'schema': SCHEMA,
         'version': __version__,

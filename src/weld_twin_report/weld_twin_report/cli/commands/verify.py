@@ -10,7 +10,7 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
 from weld_twin_msgs_py.files.whole_files import read_json
 from weld_twin_msgs_py.robots import load_robot
-from weld_twin_nodes.cli.given import Given, inputs_of
+from weld_twin_nodes.cli.given import Given, inputs_of, refuse_changed
 from weld_twin_nodes.offline.verifying import verified
 
 from ...report.verification_page import result_lines, verification_page
@@ -22,6 +22,7 @@ NOT_KEPT = 4
 
 def run(given: Given) -> int:
     """Compare, say what was promised and what was measured, write it where asked."""
+    inputs = inputs_of(recording=given.after_bag, model=given.model)
     content = read_diagnosis(given.model)
     robot = _robot(given, content)
     model = read_model(robot, given.model)
@@ -41,7 +42,7 @@ def run(given: Given) -> int:
         print(f'note: {mended}')
     print(*result_lines(result), sep='\n')
     if given.out:
-        inputs = inputs_of(recording=given.after_bag, model=given.model)
+        refuse_changed(inputs)
         arm = content['model']
         entry = result.as_dict() | {
             'robot': arm['robot'],

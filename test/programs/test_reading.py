@@ -763,6 +763,7 @@ KRL_SAID = KRL_MOVE.replace('}', ',E1 0}')
     [
         ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 500}', KRL_MOVE, KRL_SAID], [0, 1]),
         ('krl', ['PTP {E1 500}', KRL_MOVE, KRL_SAID], [0]),
+        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,A7 7}', KRL_MOVE], [0, 1]),
         ('krl', ['XHOME.E1 = RAIL', KRL_MOVE, KRL_SAID], [0]),
         ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 0.0}', KRL_MOVE, KRL_SAID], []),
         ('rapid', ['MoveExtJ rail,v100,fine;', ABB_MOVE], [0, 1]),
@@ -803,6 +804,36 @@ def test_a_point_that_another_program_of_the_folder_uses_is_left(other, held, lo
     own = context('kuka_kr16_2', 'krl')
     own = own._replace(beside=(Source('b.src', 'DEF b()\nLIN XA\nLIN XB\nEND\n'),))
     assert list(read_sources(sources, own, 'krl').fixed) == [0]
+
+
+@pytest.mark.parametrize('language', ['fanuc-ls', 'inform'])
+@pytest.mark.parametrize(
+    ('moves', 'known'),
+    [
+        (['J1', 'J1', 'L1', 'J1'], [True] * 4),
+        (['J1', 'J2', 'L2', 'J1'], [True, False, True, True]),
+        (['L1', 'J2'], [True, False]),
+        (['J1', 'J0', 'J2'], [True, True, True]),  # joints say themselves which posture it is
+    ],
+)
+def test_flags_that_ask_for_another_posture_than_before_are_not_followed(language, moves, known):
+    if language == 'fanuc-ls':
+        joints = ', '.join(f'J{k} = 5 deg' for k in range(1, 7))
+        pose = 'X = 900 mm, Y = 0 mm, Z = 300 mm,\n W = 180 deg, P = 0 deg, R = 0 deg'
+        places = [f'UF : 0, UT : 1,\n {joints}']
+        places += [f"UF : 0, UT : 1, CONFIG : '{c} U T, 0, 0, 0',\n {pose}" for c in 'NF']
+        lines = [
+            f'   1:{m[0]} P[{m[1]}] 9{"%" if m[0] == "J" else "mm/sec"} FINE ;' for m in moves
+        ]
+        points = [f'P[{k}]{{\n GP1:\n {place}\n}};' for k, place in enumerate(places)]
+        text = '\n'.join(['/PROG A', '/MN', *lines, '/POS', *points, '/END', ''])
+    else:
+        head = ['/JOB', '//NAME A', '//POS', '///TOOL 1', '///POSTYPE PULSE', 'C00000=1,1,1,1,1,1']
+        poses = [f'///RCONF {k},0,0,0\nC0000{k}=900,0,300,180,0,0' for k in (1, 2)]
+        lines = [f'MOV{m[0]} C0000{m[1]} V{"J" if m[0] == "J" else ""}=9.0' for m in moves]
+        text = '\n'.join([*head, '///POSTYPE ROBOT', *poses, '//INST', 'NOP', *lines, 'END', ''])
+    steps = read(language, (text,), PROGRAMS[language][0]).steps
+    assert ['not those of the poses before' not in step.shift.why for step in steps] == known
 
 
 def test_numbers_of_a_table_that_are_not_read_are_told():

@@ -45,6 +45,7 @@ _DISPLACING = re.compile(
     r'(?:\A|:[ \t]*)(?:(?:Touch|MP) Offset|Track|SOFTFLOAT)\b ?(End\b)?', re.I
 )
 """What shifts moves, lets them follow a sensor or give way, and what ends that."""
+_CONFIG = re.compile(r"\bCONFIG\s*:\s*'([A-Z ]*)")
 _COORD = re.compile(r'\bCOORD\b')
 _TRACKING = re.compile(r'^[ \t]*LINE_TRACK_SCHEDULE_NUMBER[ \t]*:[ \t]*[1-9]', re.M)
 """Head of a program whose points move with a conveyor; the schedule 0 is none."""
@@ -67,6 +68,7 @@ class FanucReader(Reader):
         self.points: dict[int, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.untaught: dict[int, str] = {}
+        self.config: dict[int, str] = {}
         self.blocks = Blocks(self.program, shift=unclear_shift)
 
     def read(self) -> Program:
@@ -114,6 +116,8 @@ class FanucReader(Reader):
         point = self.program.add_point(f'P[{index}]', [fields[k] for k in keys], notation)
         self.points[index] = point
         self.frames[point] = self._frames(first, last, where)
+        config = _CONFIG.search(self.text, first, last)
+        self.config[point] = '' if config is None else ' '.join(config[1].replace(' ', ''))
         known = [axis.label for axis in self.context.controller.external]
         outer = [key for key in fields if key[0] in 'EG' and key not in known]
         self.program.stands_beside(point, [1.0] * starred + [fields[key].value for key in outer])
@@ -202,6 +206,7 @@ class FanucReader(Reader):
             return
         why = f'{found[0]} shifts it' if found else ''
         why = why or (f'{move[1]} is not understood' if move[1] not in _KINDS else '')
+        why = why or self.another_posture(kind, point, self.config[point])
         if _COORD.search(tail) and not self.context.controller.external:
             why = 'COORD lets it go along with a group that the robot file does not have'
         self._add(kind, where, via, point, tail, Frame('', why=why) if why else self.shift)

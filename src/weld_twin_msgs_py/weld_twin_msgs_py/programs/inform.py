@@ -51,6 +51,8 @@ SPEED, JOINT_SPEED = 0.1, 0.1
 """m/s, and share of full speed, where a move does not say."""
 FLAGS = (*TURNS, (4, 0.5, 1.0))
 """Of RCONF; the wrist counts as flipped by the side on which axis 4 is, which changes at 90 degrees."""
+POSTURE = 3
+"""First flags of RCONF, for wrist, elbow and side; those behind count turns."""
 CM_PER_MIN = 0.01 / 60.0
 """m/s of a speed in cm/min, as ``V=50cm/min`` has it on arc welding controllers."""
 
@@ -65,7 +67,8 @@ class InformReader(Reader):
         self.points: dict[str, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.tool, self.base, self.form = Frame(''), Frame('', np.eye(4)), 'PULSE'
-        self.user = ''
+        self.user = self.flags = ''
+        self.config: dict[int, str] = {}
         self.blocks = Blocks(self.program, shift=unclear_shift)
         self.arc: list[Step] = []
 
@@ -93,6 +96,8 @@ class InformReader(Reader):
             self.tool = self.numbered('TL', value)
         elif word == 'USER':
             self.user = value
+        elif word == 'RCONF':
+            self.flags = ','.join(value.split(',')[:POSTURE])
         elif word == 'POSTYPE':
             self.form = value.upper()
         named = self.numbered('UF', self.user or 'USER')
@@ -115,6 +120,7 @@ class InformReader(Reader):
             raise DataError(f'{where}: {name} needs {count} numbers, it has {len(numbers)}')
         self.points[name] = self._added(name, numbers, count, notation)
         self.frames[self.points[name]] = self.tool, self.base
+        self.config[self.points[name]] = self.flags
 
     def _added(self, name: str, numbers: list[Number], count: int, notation: Notation) -> int:
         point = self.program.add_point(name, numbers[:count], notation)
@@ -195,6 +201,7 @@ class InformReader(Reader):
     def _step(self, kind: Kind, where: str, point: int, rest: str) -> Step:
         level = re.search(r'\bPL=(\d+)', rest)
         tool, base = self.frames[point]
+        why = self.another_posture(kind, point, self.config[point])
         return Step(
             kind,
             where,
@@ -205,7 +212,7 @@ class InformReader(Reader):
             _speed(kind, rest),
             level is not None and level[1] == '0',
             astray=flags_kept(kind, self.program.points[point], FLAGS),
-            shift=self.shift,
+            shift=Frame('', why=why) if why else self.shift,
         )
 
 

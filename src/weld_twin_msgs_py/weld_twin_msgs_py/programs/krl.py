@@ -262,7 +262,7 @@ class KrlReader(Reader):
                 point = self.program.add_point(
                     name, numbers, notation, file, self.context.external(numbered)
                 )
-                outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
+                outer = [k for k in (*EXTERNAL, 'A7') if k in content.numbers and k not in axes]
                 self.program.stands_beside(point, [content.numbers[k].value for k in outer])
                 turn = content.numbers.get('T')
                 if turn is not None and notation is KUKA_POSE:

@@ -50,6 +50,8 @@ class Reader(ABC):
         """Where the program itself sets what has a name, of which it may say no numbers."""
         self.shift = Frame('')
         """Why moves go elsewhere than their points say, where the text is read."""
+        self.posture = ''
+        """Flags of the posture that the arm comes in, of languages that do not say what they mean."""
         self.routines = 0
         self.positioner = ''
         """The external kinematic system that bases go along with."""
@@ -169,6 +171,19 @@ class Reader(ABC):
         """Return a frame of a table; one that the program sets is not what the table holds."""
         where = self.again.get(table + index, self.again.get(table, ''))
         return Frame(index, why=where and f'the numbers of {table} {index} are set at {where}')
+
+    def another_posture(self, kind: Kind, point: int, flags: str) -> str:
+        """Return that a joint move asks by its flags for another posture than the arm comes in."""
+        if self.program.points[point].value.ndim == 1:
+            self.posture = ''
+            return ''
+        self.posture = self.posture or flags
+        if kind != 'joint' or not flags or flags == self.posture:
+            return ''
+        return (
+            f'its flags ({flags}) are not those of the poses before ({self.posture}), and what posture '
+            'they mean differs between arms; give it in joints'
+        )
 
     def displacing(self, match: re.Match[str]) -> None:
         """Let a call, with the routine's name as its first group, displace what follows it."""

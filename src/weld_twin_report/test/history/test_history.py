@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import done
+from command_line import done, refused
 
 import weld_twin_core as wt
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.directions import GIVE
 from weld_twin_msgs_py.bags import write_recording
-from weld_twin_nodes.cli import main
 from weld_twin_report.history import Database, entry_of
 from weld_twin_report.history.entry import Entry
 from weld_twin_report.history.words import changed, observations
@@ -37,44 +36,31 @@ def url(tmp_path):
     return str(tmp_path / 'history.db')
 
 
-def test_a_diagnosis_is_added_once_and_shown(diagnosed, url, capsys):
-    words = ['history', 'add', str(diagnosed), '--cell', 'line 3', '--at', '2026-03-02']
-    assert main([*words, '--db', url]) == 0
-    assert main([*words, '--db', url]) == 0
-    said = capsys.readouterr().out
-    assert 'added' in said and 'was there already' in said
-    assert main(['history', 'show', '--cell', 'line 3', '--db', url]) == 0
-    shown = capsys.readouterr().out
+def test_a_diagnosis_is_added_once_and_shown(diagnosed, url):
+    words = ('history', 'add', diagnosed, '--cell', 'line 3', '--at', '2026-03-02', '--db', url)
+    assert 'added' in done(*words)
+    assert 'was there already' in done(*words)
+    shown = done('history', 'show', '--cell', 'line 3', '--db', url)
     assert '2026-03-02' in shown and 'backlash of elbow_joint' in shown
-    assert main(['history', 'show', '--db', url]) == 0
-    assert capsys.readouterr().out == 'line 3\n'
+    assert done('history', 'show', '--db', url) == 'line 3\n'
 
 
-def test_that_another_diagnosis_of_a_recording_is_not_taken_is_told(
-    diagnosed, url, tmp_path, capsys
-):
+def test_that_another_diagnosis_of_a_recording_is_not_taken_is_told(diagnosed, url, tmp_path):
     content = json.loads((Path(diagnosed) / 'diagnosis.json').read_text())
     content['verdict']['status'] = 'unknown'
     (tmp_path / 'anew.json').write_text(json.dumps(content))
     words = ['--cell', 'line 3', '--at', '2026-03-02', '--db', url]
-    assert main(['history', 'add', str(diagnosed), *words]) == 0
-    assert main(['history', 'add', str(tmp_path / 'anew.json'), *words]) == 0
-    said = capsys.readouterr().out.splitlines()[-1]
+    done('history', 'add', diagnosed, *words)
+    said = done('history', 'add', tmp_path / 'anew.json', *words).splitlines()[-1]
     assert 'what was diagnosed then stays: identified: backlash of elbow_joint' in said
 
 
-def test_a_date_that_would_be_lost_is_told(diagnosed, url, capsys):
-    words = ['history', 'add', str(diagnosed), '--cell', 'line 3', '--db', url, '--at']
-    assert main([*words, '2026-03-02']) == 0
-    assert main([*words, '2026-04-02']) == 2
-    assert '2026-03-02' in capsys.readouterr().err
-    assert (
-        main(['history', 'add', str(diagnosed), '--cell', 'b', '--db', url, '--at', '2926-03-02'])
-        == 0
-    )
-    assert '2926-03-02 is still to come' in capsys.readouterr().out
-    assert main([*words[:-3], '--db', url, '--at', '1026-03-02']) == 2
-    assert 'is no date of a recording' in capsys.readouterr().err
+def test_a_date_that_would_be_lost_is_told(diagnosed, url):
+    words = ('history', 'add', diagnosed, '--db', url, '--cell')
+    done(*words, 'line 3', '--at', '2026-03-02')
+    assert '2026-03-02' in refused(*words, 'line 3', '--at', '2026-04-02')
+    assert '2926-03-02 is still to come' in done(*words, 'b', '--at', '2926-03-02')
+    assert 'is no date of a recording' in refused(*words, 'line 3', '--at', '1026-03-02')
 
 
 def test_what_is_read_is_what_was_written(diagnosed, url):
@@ -88,14 +74,11 @@ def test_what_is_read_is_what_was_written(diagnosed, url):
     assert (back.at, back.names, back.effects) == (entry.at, entry.names, entry.effects)
 
 
-def test_what_cannot_be_added_is_refused_in_a_sentence(diagnosed, url, tmp_path, capsys):
-    def said(*words):
-        assert main(['history', 'add', *map(str, words), '--db', url]) == 2
-        return capsys.readouterr().err
-
-    assert 'are no dates' in said(diagnosed, '--cell', 'a')
-    assert "'Monday' is no date" in said(diagnosed, '--cell', 'a', '--at', 'Monday')
-    assert 'cannot be read' in said(tmp_path, '--cell', 'a')
+def test_what_cannot_be_added_is_refused_in_a_sentence(diagnosed, url, tmp_path):
+    add = ('history', 'add', '--cell', 'a', '--db', url)
+    assert 'are no dates' in refused(*add, diagnosed)
+    assert "'Monday' is no date" in refused(*add, diagnosed, '--at', 'Monday')
+    assert 'cannot be read' in refused(*add, tmp_path)
     old = tmp_path / 'old'
     shutil.copytree(diagnosed, old)
     file = old / 'diagnosis.json'
@@ -103,15 +86,14 @@ def test_what_cannot_be_added_is_refused_in_a_sentence(diagnosed, url, tmp_path,
     for each in data['posterior']['coordinates']:
         del each['prior_std']
     file.write_text(json.dumps(data))
-    assert 'diagnose the recording again' in said(old, '--cell', 'a', '--at', '2026-03-02')
+    assert 'diagnose the recording again' in refused(*add, old, '--at', '2026-03-02')
     assert not Path(url).exists()
 
 
-def test_without_sqlalchemy_a_sentence_says_how_to_install_it(url, monkeypatch, capsys):
+def test_without_sqlalchemy_a_sentence_says_how_to_install_it(url, monkeypatch):
     monkeypatch.setitem(sys.modules, 'sqlalchemy', None)
     monkeypatch.delitem(sys.modules, 'weld_twin_report.cli.commands.history', raising=False)
-    assert main(['history', 'show', '--db', url]) == 2
-    assert "pip install 'weld-twin[history]'" in capsys.readouterr().err
+    assert "pip install 'weld-twin[history]'" in refused('history', 'show', '--db', url)
 
 
 def test_another_robot_is_another_cell(diagnosed, url):
@@ -141,10 +123,9 @@ def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
     assert changed(entries, observations(entries)) == ()
 
 
-def test_what_is_no_history_is_refused(tmp_path, capsys):
+def test_what_is_no_history_is_refused(tmp_path):
     (tmp_path / 'notes.txt').write_text('not a database, but long enough to look like one' * 40)
-    assert main(['history', 'show', '--db', str(tmp_path / 'notes.txt')]) == 2
-    assert 'cannot be used' in capsys.readouterr().err
+    assert 'cannot be used' in refused('history', 'show', '--db', tmp_path / 'notes.txt')
 
 
 @pytest.fixture(scope='module')
@@ -168,15 +149,13 @@ def checked(tmp_path_factory):
 
 
 def test_a_zero_that_slipped_between_two_checks_is_as_sure_as_their_recordings_make_it(
-    checked, url, capsys
+    checked, url
 ):
     # Either diagnosis alone leaves it open what is a zero and what unevenness of the gear, by more
     # than the zero moved; but the gear is the same in both.
     for k, day in enumerate(('2026-01-05', '2026-03-05')):
-        words = ['history', 'add', str(checked / f'found{k}'), '--cell', 'c', '--at', day]
-        assert main([*words, '--db', url]) == 0
-    capsys.readouterr()
-    assert main(['history', 'changed', '--cell', 'c', '--db', url, '--json']) == 0
-    (change,) = json.loads(capsys.readouterr().out)['changes']
+        done('history', 'add', checked / f'found{k}', '--cell', 'c', '--at', day, '--db', url)
+    said = done('history', 'changed', '--cell', 'c', '--db', url, '--json')
+    (change,) = json.loads(said)['changes']
     assert (change['effect'], change['joint']) == ('joint_offset', 'elbow_joint')
     assert abs(change['size'] + 3e-4) < 3.0 * change['std'] and change['std'] < 3e-5

@@ -39,6 +39,16 @@ def test_a_step_is_found_so_finely_that_stairs_stay_in_phase_far_from_zero(step)
     assert abs(best.step - step) * np.abs(q).max() / step < 0.01 * step
 
 
+def test_stairs_that_are_counted_from_anywhere_are_found():
+    true = effect('quantization', joint='elbow_joint', step=1.7e-3, phase=0.4)
+    problem, model = tiny((true,), static=False, count=400)
+    q = problem.recordings[0].joints.q[:, 2]
+    near = effect('quantization', joint='elbow_joint', step=1.7e-3 * (1 + 1e-4), phase=0.1)
+    best = started(problem, model, known_scale(problem), near)
+    ends = np.array([q.min(), q.max()])
+    assert np.abs(ends / best.step - best.phase - (ends / 1.7e-3 - 0.4)).max() % 1.0 < 0.02
+
+
 def test_an_effect_whose_fit_has_one_optimum_starts_where_it_is():
     offset = effect('joint_offset', joint='elbow_joint', offset=1e-3)
     problem, model = tiny((offset,))

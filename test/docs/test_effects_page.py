@@ -27,8 +27,8 @@ BY_HAND = (
     '`backlash` | joint | `width` rad | `form` | order | yes | all',
     '`transmission_ripple` | joint | `amplitude` rad, `order` 1/rev, `phase` rad |  |  | no '
     '| all but `order`',
-    '`friction` | joint | `windup` rad, `asymmetry` -, `travel` rad | `release` | time, velocity '
-    '| yes | all',
+    '`friction` | joint | `windup` rad, `asymmetry` -, `travel` rad, `recovery` 1/s | `release` | time, '
+    'velocity | yes | all',
     '`thermal_growth` | links | `coefficient` 1/K | `reference`, `links`, `warmup` | temperature '
     '| no | all',
     '`measurement_noise` | robot | `sigma` m |  |  | no | none',

@@ -159,9 +159,10 @@ def joint_coupling(cell):
     cell.q[2] += 5e-3 * cell.q[1]
 
 
-@defines(joint='j1', step=1e-2)
+@defines(joint='j1', step=1e-2, phase=0.3)
 def quantization(cell):
-    cell.q[1] = np.floor(cell.q[1] / 1e-2 + 0.5) * 1e-2
+    """Stairs at three tenths of a step and every step on."""
+    cell.q[1] = np.floor((cell.q[1] - 3e-3) / 1e-2 + 0.5) * 1e-2 + 3e-3
 
 
 def settled(cell, torque):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lost motion: friction against the drive's loop, the loop of a strain-wave gear, play ahead."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -79,13 +80,45 @@ def test_friction_solves_its_differential_equation(arm):
     np.testing.assert_allclose(under(arm, effect, swung(path)), expected, atol=1e-11)
 
 
+def test_a_loop_with_integral_action_takes_the_wind_up_back(arm):
+    path = np.r_[np.linspace(0.0, 0.5, 200), np.linspace(0.5, 0.2, 200)]
+    recording = swung(path)
+    held = Friction('j2', 1e-3, travel=2e-2, release=1e3)
+    bent, step = under(arm, held, recording), np.diff(recording.joints.t, prepend=0.0)
+    left, expected = 0.0, []
+    for change, dt in zip(np.diff(bent, prepend=0.0), step, strict=True):
+        left = (left + change) * np.exp(-3.0 * dt)
+        expected.append(left)
+    recovers = Friction('j2', 1e-3, travel=2e-2, release=1e3, recovery=3.0)
+    found = under(arm, recovers, recording)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    # it has trailed by the wind-up after the start, and by twice as much after the reversal
+    assert found[:200].min() < -0.5e-3 and found[200:].max() > 0.5e-3
+    assert abs(found[199]) < 0.2e-3
+
+
+def test_a_loop_that_recovers_is_found(arm):
+    recording = swung(np.r_[np.linspace(0.0, 0.5, 200), np.linspace(0.5, 0.2, 200)])
+    true = Friction('j2', 1e-3, travel=3e-4, release=1e3, recovery=2.0)
+    pull = under(arm, true, recording)
+    view = Twin(arm).joint_view(recording)
+    seeds = list(Friction.seeds(view, 'j2'))
+    alike = [
+        abs(np.corrcoef(under(arm, replace(s, windup=1.0), recording), pull)[0, 1]) for s in seeds
+    ]
+    best = seeds[int(np.argmax(alike))]
+    assert best.recovery == 2.0 and max(alike) > 0.99
+    slow = best.fit.with_coordinates(np.array([1e-3, 3e-4, 0.0]))
+    assert slow.fit.coordinates().tolist() == [1e-3, 3e-4, 0.5]
+
+
 def test_a_fit_leaves_even_friction_even():
     even, uneven = Friction('j2', 1e-3, travel=2e-4), Friction('j2', 1e-3, 0.1, 2e-4)
     assert even.fit.coordinates().tolist() == [1e-3, 2e-4]
     moved = even.fit.with_coordinates(np.array([2e-3, 3e-4]))
-    assert moved.vector().tolist() == [2e-3, 0.0, 3e-4]
+    assert moved.vector().tolist() == [2e-3, 0.0, 3e-4, 0.0]
     moved = uneven.fit.with_coordinates(np.array([2e-3, 0.2, 3e-4]))
-    assert moved.vector().tolist() == [2e-3, 0.2, 3e-4]
+    assert moved.vector().tolist() == [2e-3, 0.2, 3e-4, 0.0]
     assert uneven.errors(np.array([1e-5, 0.05, 1e-5])) == {
         'windup': 1e-5,
         'asymmetry': 0.05,
@@ -108,9 +141,9 @@ def test_a_friction_that_pushes_is_refused(arm):
 @pytest.mark.parametrize(
     ('entry', 'coefficients', 'expected'),
     [
-        ({'effect': 'friction', 'asymmetry': 1e-9}, [2e-4, 5e-5], [2e-4, 0.25, 3e-4]),
-        ({'effect': 'friction', 'asymmetry': 1e-9}, [-2e-4, 5e-5], [0.0, 1e-9, 3e-4]),
-        ({'effect': 'friction'}, [2e-4], [2e-4, 0.0, 3e-4]),
+        ({'effect': 'friction', 'asymmetry': 1e-9}, [2e-4, 5e-5], [2e-4, 0.25, 3e-4, 0.0]),
+        ({'effect': 'friction', 'asymmetry': 1e-9}, [-2e-4, 5e-5], [0.0, 1e-9, 3e-4, 0.0]),
+        ({'effect': 'friction'}, [2e-4], [2e-4, 0.0, 3e-4, 0.0]),
         ({'effect': 'hysteresis', 'travel': 0.2}, [3e-4], [3e-4, 0.2]),
         ({'effect': 'hysteresis', 'travel': 0.2}, [-3e-4], [0.0, 0.2]),
     ],

@@ -21,7 +21,7 @@ ENTRIES = {
     'joint_coupling': {'joint': 'j3', 'source': 'j4', 'ratio': 1e-3},
     'gear_ratio_by_direction': {'joint': 'j2', 'difference': 1e-2, 'travel': 0.02},
     'hysteresis': {'joint': 'j2', 'amplitude': 1e-3, 'travel': 0.2},
-    'friction': {'joint': 'j2', 'windup': 5e-3, 'asymmetry': -0.2, 'travel': 0.1},
+    'friction': {'joint': 'j2', 'windup': 5e-3, 'asymmetry': -0.2, 'travel': 0.1, 'recovery': 1.5},
     'loaded_play': {'joint': 'j1', 'width': 1e-4, 'torque': 20.0},
     'stiffening': {'joint': 'j1', 'compliance': 1e-6, 'torque': 20.0},
     'bearing_tilt': {

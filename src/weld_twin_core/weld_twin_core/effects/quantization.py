@@ -1,6 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Quantization: the joint is known only to the nearest step of its encoder."""
+"""
+Quantization: the joint is known only to the nearest step of its encoder.
+
+The stairs are counted from the joint's zero, or, as an encoder is mounted anyhow and one that drops
+digits rounds down, from a ``phase`` beside it, in steps.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +29,15 @@ _ZOOM, _ZOOMS = 16, 3
 """Steps tried to either side at each closer look, and how many looks there are."""
 _MOST = 2000
 """Steps tried at once at most, which bounds memory."""
+_PHASES = 16
+"""Phases that a search tells apart."""
 
 
 class _Search(SearchHooks):
     def trials(self, view: View, joint: str | None) -> float:
-        """Return how many steps the spectrum tells apart."""
+        """Return how many steps and phases the spectrum tells apart."""
         travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
-        return max(1.0, travel / _FINEST)
+        return _PHASES * max(1.0, travel / _FINEST)
 
 
 class _Fit(FitHooks):
@@ -41,20 +48,29 @@ class _Fit(FitHooks):
         Return steps so close that the staircase stays in phase up to the largest position.
 
         A spectrum tells a step only as finely as one period over the travel; stairs are counted
-        from zero, so at position q a step off by ds shifts them by q ds / step of a period.
+        from zero, so at position q a step off by ds shifts them by q ds / step of a period. Where the
+        phase is free, the stairs turn about the middle of the travel, with all phases there at first.
         """
         q = view.joint(view.robot.index(self.effect.joint))
-        travel, far = float(np.ptp(q)), float(np.abs(q).max())
+        travel, middle = float(np.ptp(q)), 0.5 * float(q.min() + q.max())
         if zoom == _ZOOMS or self.effect.step <= 0.0 or travel <= 0.0:
             return None
+        free, closer = self.effect.phase != 0.0, (0.5 * _ZOOM) ** zoom
+        far = 0.5 * travel if free else float(np.abs(q).max())
         fine = _PHASE / far
         half = 1.0 / (travel * fine) if zoom == 0 else float(_ZOOM)
         offset = np.arange(-min(int(half) + 1, _MOST // 2), min(int(half) + 1, _MOST // 2) + 1)
-        steps = 1.0 / (1.0 / self.effect.step + offset * fine / (0.5 * _ZOOM) ** zoom)
+        around = np.arange(_PHASES) if zoom == 0 else np.arange(-4, 5)
+        turns = around / (_PHASES * closer) if free else np.zeros(1)
+        counts, turns = (grid.ravel() for grid in np.meshgrid(offset * fine / closer, turns))
+        steps = 1.0 / (1.0 / self.effect.step + counts)
+        phases = self.effect.phase + middle * counts + turns if free else np.zeros(steps.size)
+        phases = phases[steps > 0.0] - np.rint(phases[steps > 0.0])
         steps = steps[steps > 0.0]
-        many = Quantization(self.effect.joint, steps)
+        many = Quantization(self.effect.joint, steps, phases)
         displaced = many.displace(view)[('q', view.robot.index(self.effect.joint))]
-        return [Quantization(self.effect.joint, float(step)) for step in steps], displaced
+        pairs = zip(steps.tolist(), phases.tolist(), strict=True)
+        return [Quantization(self.effect.joint, *pair) for pair in pairs], displaced
 
 
 class _Twin(TwinHooks):
@@ -63,22 +79,23 @@ class _Twin(TwinHooks):
     def jump(self, view: View) -> Shift:
         """Return a step wherever a stair is climbed: between, its joint goes on and jumps nowhere."""
         joint, step = view.robot.index(self.effect.joint), float(self.effect.step)
-        stairs = np.rint(view.joint(joint) / (step or np.inf))
+        stairs = np.rint(view.joint(joint) / (step or np.inf) - float(self.effect.phase))
         return {('q', joint): step * np.sign(np.diff(stairs))}
 
 
 @register
 class Quantization(Effect):
-    """Rounding to a multiple of ``step``; a step of zero rounds nothing."""
+    """Rounding to stairs of ``step``, ``phase`` steps beside zero; a step of zero rounds nothing."""
 
     joint: str
     step: Value = 0.0
+    phase: Value = 0.0
 
     name = 'quantization'
     traits = Traits(
         title='encoder resolution',
         meaning='a joint is read in steps',
-        formula='θ → step · round(θ / step)',
+        formula='θ → step · (round(θ / step − phase) + phase)',
         entered='the encoder',
         depends_on='angle',
         jumps=True,
@@ -93,6 +110,9 @@ class Quantization(Effect):
             (1e-3, 0.0, 1e-2), 'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder'
         )
         .plausible_sliding((1e-5, 0.0, 1e-3), 'derived: a millimetre is no scale'),
+        Parameter(
+            'phase', '-', typical=0.1, lower=-0.5, upper=0.5, differentiable=False, linear=False
+        ).plausible((np.inf, -0.5, 0.5), 'derived: half a step to either side is all there is'),
     )
     search = Hooked(_Search)
     fit = Hooked(_Fit)
@@ -101,7 +121,8 @@ class Quantization(Effect):
     def displace(self, view: View) -> Shift:
         step = self.number('step')
         safe = np.where(step > 0.0, step, 1.0)
-        error = safe * np.rint(self._theta(view) / safe) - self._theta(view)
+        phase = self.number('phase')
+        error = safe * (np.rint(self._theta(view) / safe - phase) + phase) - self._theta(view)
         return self._moves(view, np.where(step > 0.0, error, 0.0))
 
     @classmethod
@@ -132,8 +153,12 @@ class Quantization(Effect):
             k = int(np.argmax(power))
             if power[k] <= 0.0:
                 return
-            near = _parabola(power, k)
-            yield cls(str(joint), size * cell / near)
+            best = size * cell / _parabola(power, k)
+            # Stairs of phase p are minus the sine of 2 pi (q / step - p), and finer waves.
+            wave = np.angle((pull * np.exp(-2j * np.pi * q / best)).sum())
+            phase = 0.25 - float(wave) / (2.0 * np.pi)
+            yield cls(str(joint), best)
+            yield cls(str(joint), best, phase - round(phase))
             power[max(k - 6, 0) : k + 7] = 0.0
 
     def atoms(self, view: View) -> list[Shift]:
@@ -141,7 +166,7 @@ class Quantization(Effect):
         return [self.displace(view)]
 
     def from_atoms(self, coefficients: Array) -> Quantization:
-        """Return the same staircase: its height and step are one parameter."""
+        """Return the same staircase: its height is its step."""
         return self
 
     def remedy(self, robot: Robot) -> str:

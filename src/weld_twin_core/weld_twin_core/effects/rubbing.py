@@ -12,6 +12,10 @@ the motion, soft below travel / release. u is the same whichever way the joint m
 does, and gone once it rests. Viscous friction does what a lag does, and is `servo_lag`. A loop that
 never lets go trails as play does, and is reported as `backlash`.
 
+A loop with integral action takes the wind-up back while the joint moves, too, at the rate
+``recovery``: what is left is a bump behind every reversal (the quadrant glitch of machine tools) and
+behind every start. There the joint rests where it stuck, so that its bristles hold.
+
 Hysteresis is a loop of lost motion that closes over a travel, as in a strain-wave gear. Teeth and
 flexspline rub over many contacts that let go one after the other. The output trails by ``amplitude``
 times z, which forgets where it came from over ``travel``:
@@ -36,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from .associative_scan import bristle, bristle_tangent
+from .associative_scan import bristle, bristle_tangent, linear
 from .effect import Effect, FitHooks, Hooked, MemoryEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 
@@ -46,23 +50,41 @@ _UNEVEN = 0.6
 """Asymmetry beyond which one direction would hardly rub at all. A judgement."""
 _A_LITTLE = 1e-9
 """Asymmetry of friction that may become uneven in a fit."""
+_HELD = 1e3
+"""Time [s] in which bristles let go that hold: none of a recording's rests is as long."""
+_RECOVERIES = (0.5, 2.0, 8.0, 32.0)
+"""Rates [1/s] of integral action that a search considers: slower than 2 s trails as play does."""
 
 
 class _Fit(FitHooks):
     effect: Friction
 
     def fitted(self) -> list[int]:
-        """Return wind-up and travel, and the asymmetry where there is any."""
-        return [0, 2] if self.effect._even else [0, 1, 2]
+        """Return wind-up and travel, and asymmetry and recovery where there is any."""
+        more = [] if self.effect._even else [1]
+        return sorted([0, 2, *more, *([3] if self.effect._recovers else [])])
+
+    def with_coordinates(self, values: Array) -> Any:
+        """Return the same at other fit coordinates; a loop that recovers goes on doing so."""
+        found = super().with_coordinates(values)
+        slow = self.effect._recovers and found.number('recovery') < _RECOVERIES[0]
+        return replace(found, recovery=_RECOVERIES[0]) if slow else found
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
-        """Return friction of all travels: a start that is far off ends beside the best."""
+        """Return friction of all travels and recoveries: a start far off ends beside the best."""
         if zoom or view.static:
             return None
         unit = view.radian(view.robot.index(self.effect.joint))
-        travels = unit * np.geomspace(_SHORTEST, _LONGEST, 7)
-        each = [replace(self.effect, windup=1.0, travel=float(travel)) for travel in travels]
-        many = replace(self.effect, windup=1.0, travel=travels)
+        rates = np.array(_RECOVERIES if self.effect._recovers else (0.0,))
+        travels, rates = (
+            grid.ravel()
+            for grid in np.meshgrid(unit * np.geomspace(_SHORTEST, _LONGEST, 7), rates)
+        )
+        each = [
+            replace(self.effect, windup=1.0, travel=float(travel), recovery=float(rate))
+            for travel, rate in zip(travels, rates, strict=True)
+        ]
+        many = replace(self.effect, windup=1.0, travel=travels, recovery=rates)
         return each, many.run(view)[0]['q', view.robot.index(self.effect.joint)]
 
 
@@ -72,7 +94,7 @@ class Friction(MemoryEffect):
     Lost motion that is there while the joint moves and goes when it rests.
 
     Going up the joint trails by windup (1 + asymmetry), going down by windup (1 - asymmetry).
-    Friction that is even stays so in a fit.
+    Friction that is even stays so in a fit, and so does a loop without integral action.
     """
 
     joint: str
@@ -80,13 +102,15 @@ class Friction(MemoryEffect):
     asymmetry: Value = 0.0
     travel: Value = 3e-4
     release: float = 0.3
+    recovery: Value = 0.0
 
     name = 'friction'
     traits = Traits(
         title='friction',
         meaning='a joint lags behind while it moves, and gives that up when it rests',
         formula='θ → θ − windup (z + asymmetry u), ż = (sign θ̇ − z) abs(θ̇) / travel − z / '
-        'release, u̇ = (1 − u) abs(θ̇) / travel − u / release, both 0 at first',
+        'release, u̇ = (1 − u) abs(θ̇) / travel − u / release, both 0 at first; a loop that '
+        'takes it back loses what it trails by at `recovery`',
         apart={'backlash': 'push the link to and fro while the motor holds: only play gives way'},
         entered="the joint's gear, bearings and grease",
         depends_on='direction',
@@ -125,6 +149,12 @@ class Friction(MemoryEffect):
             (1e-4, 1e-7, 2e-4),
             'derived: rolling guides bend by micrometres to a tenth of a millimetre',
         ),
+        Parameter(
+            'recovery', '1/s', typical=2.0, lower=0.0, linear=False, idealised=0.3
+        ).plausible(
+            (20.0, 0.0, 200.0),
+            'derived: integral times of servo loops are some milliseconds to some seconds',
+        ),
     )
     options = ('release',)
     needs = frozenset({'velocity', 'time'})
@@ -143,12 +173,25 @@ class Friction(MemoryEffect):
         z = bristle(both, travel, lost, z0)
         return z, both, lost, (view.t[-1], q[..., -1], z[..., -1])
 
+    def _left(self, bent: Array, lost: Array, before: Any = (0.0, 0.0)) -> Array:
+        """Return what a loop leaves of bends (..., 2, N), from the last of both that were before."""
+        if not self._recovers:
+            return bent
+        last, left = before
+        rate = np.asarray(self.recovery, dtype=np.float64)[..., None, None]
+        kept = np.exp(-rate * self.release * lost)
+        step = np.diff(bent, axis=-1, prepend=np.broadcast_to(last, bent.shape[:-1])[..., None])
+        return linear(kept, kept * step, np.broadcast_to(left, bent.shape[:-1]))
+
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return minus the wind-up, larger in the direction that rubs more."""
         if view.static:
             return self._moves(view, np.zeros_like(self._theta(view))), None
-        z, _, _, state = self._bent(view, state)
-        return self._moves(view, -self.number('windup') * self._mixed(z)), state
+        bends, left = (None, (0.0, 0.0)) if state is None else state
+        z, _, lost, bends_after = self._bent(view, bends)
+        after = self._left(z, lost, left)
+        state = bends_after, (z[..., -1], after[..., -1])
+        return self._moves(view, -self.number('windup') * self._mixed(after)), state
 
     def _mixed(self, both: Array) -> Array:
         """Return the even part and the asymmetry's share of the uneven one, shape (..., N)."""
@@ -156,13 +199,19 @@ class Friction(MemoryEffect):
 
     def gradient(self, view: View) -> list[Shift | None]:
         if view.static:
-            return [self._moves(view, np.zeros_like(self._theta(view)))] * 3
+            return [self._moves(view, np.zeros_like(self._theta(view)))] * 4
         z, both, lost, _ = self._bent(view, None)
         travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
         slope = bristle_tangent(both, travel, lost, z, -np.abs(both) / travel**2)
+        left, slope = self._left(z, lost), self._left(slope, lost)
+        # What is left falls by itself in every step of time: the same recursion, driven by it.
+        step = self.release * lost
+        rate = np.asarray(self.recovery, dtype=np.float64)[..., None, None]
+        fallen = linear(np.exp(-rate * step), -step * left, np.zeros(left.shape[:-1]))
         windup = self.number('windup')
-        parts = (self._mixed(z), windup * z[..., 1, :], windup * self._mixed(slope))
-        return [self._moves(view, -part) for part in parts]
+        parts = (left, windup * slope, windup * fallen)
+        even, bent, rated = (-self._mixed(part) for part in parts)
+        return [self._moves(view, each) for each in (even, -windup * left[..., 1, :], bent, rated)]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Add how the bristles follow the tangent's own steps."""
@@ -172,20 +221,26 @@ class Friction(MemoryEffect):
         travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
         own = np.diff(tangent, axis=-1, prepend=tangent[..., :1])[..., None, :]
         change = np.where(both[..., :1, :] < 0.0, -own, own) / travel
-        slope = bristle_tangent(both, travel, lost, z, change)
+        slope = self._left(bristle_tangent(both, travel, lost, z, change), lost)
         return np.asarray(tangent - self.number('windup') * self._mixed(slope))
 
     @property
     def _even(self) -> bool:
         return np.ndim(self.asymmetry) == 0 and self.asymmetry == 0.0
 
+    @property
+    def _recovers(self) -> bool:
+        return bool(np.any(np.asarray(self.recovery) > 0.0))
+
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """Yield friction of short and long pre-sliding, even and uneven."""
+        """Yield friction of short and long pre-sliding, even and uneven, and loops that recover."""
         unit = view.radian(view.robot.index(str(joint)))
         for travel in (1e-4, 6e-4):
             for asymmetry in (0.0, _A_LITTLE):
                 yield cls(str(joint), 0.0, asymmetry, travel * unit)
+        for recovery in _RECOVERIES:
+            yield cls(str(joint), 0.0, 0.0, 3e-4 * unit, _HELD, recovery)
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the even part, and the uneven one where there is any: both are linear."""
@@ -193,8 +248,9 @@ class Friction(MemoryEffect):
         if view.static:
             # As many as in motion, so that stations and paths can be diagnosed together.
             return [self._moves(view, np.zeros_like(self._theta(view))) for _ in parts]
-        z = self._bent(view, None)[0]
-        return [self._moves(view, -z[..., k, :]) for k in parts]
+        z, _, lost, _ = self._bent(view, None)
+        left = self._left(z, lost)
+        return [self._moves(view, -left[..., k, :]) for k in parts]
 
     def from_atoms(self, coefficients: Array) -> Friction:
         """Return the wind-up of the even part; what the uneven part is of it is the asymmetry."""

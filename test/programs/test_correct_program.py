@@ -195,6 +195,16 @@ end
 """
 
 
+def test_the_correction_of_another_program_is_not_replaced(tmp_path):
+    assert corrected(tmp_path, SEAM).code == 0
+    written = (tmp_path / 'out' / 'seam.script').read_bytes()
+    said = corrected(tmp_path, SEAM, name='other.script')
+    assert said.code == 2 and 'holds the correction of seam.script' in said.err
+    assert (tmp_path / 'out' / 'seam.script').read_bytes() == written
+    assert corrected(tmp_path, SEAM).code == 0
+    assert corrected(tmp_path, SEAM, '--force', name='other.script').code == 0
+
+
 def test_a_model_that_is_replaced_while_a_program_is_corrected_is_refused(tmp_path, monkeypatch):
     made = correcting.corrected_program
 
@@ -266,7 +276,8 @@ def test_a_corrected_trajectory_in_json_says_so_in_its_header(header, frame, tmp
     assert said.code == 0, said.err
     written = (tmp_path / 'out' / 'plan.json').read_text()
     assert json.loads(written)['header']['frame_id'] == frame
-    said = corrected(tmp_path, written, name='goal.json')
+    (tmp_path / 'elsewhere').mkdir()
+    said = corrected(tmp_path / 'elsewhere', written, name='goal.json')
     assert said.code == 2 and 'was corrected already' in said.err
 
 

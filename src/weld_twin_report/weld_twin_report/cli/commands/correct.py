@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.program_correction import Caps
@@ -38,21 +39,37 @@ def run(given: Given) -> int:
         given.refuse(of_program, f"is of a program; '{given.program}' is a bag")
         return _corrected_bag(given)
     given.refuse(names_of(TOPICS), f"is of a bag; '{given.program}' is none")
+    if not given.force:
+        _refuse_another(Path(given.out), what)
     if given.model:
         _refuse_corrected(what)
     return _corrected_program(given)
 
 
+def _correction_in(folder: Path) -> dict[str, Any]:
+    try:
+        return read_json(folder / RESULT)
+    except DataError:
+        return {}
+
+
 def _refuse_corrected(program: Path) -> None:
     """Refuse a program that lies where a correction without remarks moved its points."""
-    try:
-        content = read_json(program.resolve().parent / RESULT)
-    except DataError:
-        return
+    content = _correction_in(program.resolve().parent)
     moves = content.get('moves', ())
     some = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
     if some and content.get('program') == program.name:
         raise corrected_twice(program.name, f"'{RESULT}' beside it says so")
+
+
+def _refuse_another(out: Path, program: Path) -> None:
+    """Refuse the folder of another program, whose corrected file would go with its promise."""
+    there = _correction_in(out).get('program', program.name)
+    if there != program.name:
+        raise DataError(
+            f"'{out}' holds the correction of {there}, which would be removed; give {program.name} a "
+            'folder of its own'
+        )
 
 
 def _corrected_bag(given: Given) -> int:

@@ -125,11 +125,19 @@ def test_a_row_that_stands_out_is_named_and_kept(tmp_path, ur5):
     q, T = poses(ur5, 60)
     position = T[:, :3, 3] + np.random.default_rng(1).normal(0.0, 1e-3, (60, 3))
     position[17] += 0.08
-    recording, said = read_table(
-        table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, position), ur5
-    )
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, position)
+    recording, said = read_table(path, ur5)
     assert any(s.startswith('1 rows stand out, most of all line 19') for s in said)
     assert recording.joints.t.size == 60
+    # Rows are given as the option counts them, also where some were left out before.
+    (sentence,) = (
+        s
+        for s in read_table(path, ur5, TableOptions(skip_rows=(3,))).assumptions
+        if 'stand out' in s
+    )
+    assert sentence.endswith('--skip-rows 18 leaves them out')
+    _, said = read_table(path, ur5, TableOptions(skip_rows=(3, 18)))
+    assert not any('stand out' in s for s in said)
 
 
 def test_stamps_that_increase_are_kept(tmp_path, ur5):

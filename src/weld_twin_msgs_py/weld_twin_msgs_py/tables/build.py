@@ -24,6 +24,8 @@ from .rotations import AGREES, COUNTING, disagreement, find_convention, rotation
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
 from .words import OWN, TableOptions, tokens
 
+_LISTED = 8
+"""Rows that stand out which are listed at most."""
 _FAR = 10.0
 """A row this many times farther off than the median row is pointed out."""
 _FARTHEST = 1e9
@@ -95,7 +97,7 @@ def table_and_units(
     try:
         columns = find_columns(cells.header, robot, options)
         usable, log = _usable(cells, columns, options, said)
-        return _Reading(usable, robot, columns, options, said, log).table()
+        return _Reading(usable, robot, columns, options, said, log, cells.lines).table()
     except DataError as error:
         text = str(error)
         raise DataError(text if str(path) in text else f"table '{path}': {text}") from None
@@ -117,6 +119,8 @@ class _Reading:
     said: list[str]
     log: Cells
     """Rows with all joints, also those in which nothing was measured."""
+    lines: list[int]
+    """Where every row of the file stands in it, as `--skip-rows` counts them."""
 
     def table(self) -> tuple[Table, Units]:
         """Return what the table means, and the units of the joints whose columns name none."""
@@ -326,10 +330,12 @@ class _Reading:
             return
         far = np.flatnonzero(off > _FAR * typical)
         if far.size:
-            worst = int(far[off[far].argmax()])
+            worst = far[np.argsort(-off[far])]
+            rows = [str(self.lines.index(self.cells.lines[k]) + 1) for k in worst[:_LISTED]]
             self.said.append(
-                f'{far.size} rows stand out, most of all line {self.cells.lines[worst]} with '
-                f'{off[worst] * 1e3:.3g} mm; they are kept, --skip-rows leaves rows out'
+                f'{far.size} rows stand out, most of all line {self.cells.lines[worst[0]]} with '
+                f'{off[worst[0]] * 1e3:.3g} mm; they are kept, --skip-rows {",".join(rows)} leaves '
+                f'{"them" if far.size <= _LISTED else "the worst"} out'
             )
 
 

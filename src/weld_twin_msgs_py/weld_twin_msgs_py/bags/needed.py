@@ -9,46 +9,37 @@ from weld_twin_core.arm.robot import Robot
 
 from ..assembly import Role
 from ..assembly.foreign_types import ACCEPTED, SURE_POSE, split_topic
-from ..messages.topics import (
-    BY_NAME,
-    JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_POSE,
-    MEASURED_SIGMA,
-    TEMPERATURE,
-    TOOL_WRENCH,
-    TopicNames,
-)
+from ..messages import topics
 
-_PLAIN_POSES = (MEASURED_POSE.type, SURE_POSE)
+_PLAIN_POSES = (topics.MEASURED_POSE.type, SURE_POSE)
 TYPES: Mapping[Role, tuple[str, ...]] = {
-    Role.POSE: ACCEPTED[MEASURED_POSE.name],
-    Role.POINT: (MEASURED_POINT.type,),
-    Role.SIGMA: (MEASURED_SIGMA.type,),
-    Role.WRENCH: (TOOL_WRENCH.type,),
-    Role.TEMPERATURE: (TEMPERATURE.type,),
-    Role.JOINTS: ACCEPTED[JOINT_STATES.name],
+    Role.POSE: ACCEPTED[topics.MEASURED_POSE.name],
+    Role.POINT: (topics.MEASURED_POINT.type,),
+    Role.SIGMA: (topics.MEASURED_SIGMA.type,),
+    Role.WRENCH: (topics.TOOL_WRENCH.type,),
+    Role.TEMPERATURE: (topics.TEMPERATURE.type,),
+    Role.JOINTS: ACCEPTED[topics.JOINT_STATES.name],
 }
 """Message types from which each role is read."""
 Present = Mapping[str, tuple[str, int]]
 """Type and number of messages of every topic of a bag."""
 _LISTED = 12
 """Names of joints that fit into a message."""
-_INPUTS = frozenset(TopicNames.topics())
-_RESULTS = tuple(name for name in BY_NAME if name not in _INPUTS)
+_INPUTS = frozenset(topics.TopicNames.topics())
+_RESULTS = tuple(name for name in topics.BY_NAME if name not in _INPUTS)
 """What the nodes make themselves: never to be diagnosed as if it were measured."""
 
 
-def no_joints(names: TopicNames, present: Present) -> str:
+def no_joints(names: topics.TopicNames, present: Present) -> str:
     """Return that there are no joint states, and which topic may be meant."""
     return f"no joint states on '{names.joints}'" + _meant(
-        present, ((JOINT_STATES.type, 'joint'),), (names.joints,)
+        present, ((topics.JOINT_STATES.type, 'joint'),), (names.joints,)
     )
 
 
-def no_measurements(names: TopicNames, present: Present) -> str:
+def no_measurements(names: topics.TopicNames, present: Present) -> str:
     """Return that nothing was measured, and which topic may be meant."""
-    kinds = (*((kind, 'pose') for kind in _PLAIN_POSES), (MEASURED_POINT.type, 'point'))
+    kinds = (*((kind, 'pose') for kind in _PLAIN_POSES), (topics.MEASURED_POINT.type, 'point'))
     return f"no measurements on '{names.pose}' or '{names.point}'" + _meant(
         present, kinds, (names.pose, names.point)
     )

@@ -20,23 +20,10 @@ from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
 from ..assembly.frame_names import WORLD
+from ..messages import topics
 from ..messages.from_messages import NANOSECONDS
 from ..messages.layout import layout_of
 from ..messages.to_messages import Messages, bag_messages
-from ..messages.topics import (
-    ACTUAL_JOINT_STATES,
-    CONTACT,
-    DEVIATION,
-    IMAGE_POINTS,
-    JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_POSE,
-    MEASURED_SIGMA,
-    TEMPERATURE,
-    TOOL_WRENCH,
-    TWIN_COVARIANCE,
-    TWIN_POSE,
-)
 from ..messages.typestore import TYPES
 from .images import rows_of
 from .writer import BagWriter
@@ -107,15 +94,15 @@ def write_recording(
     entries = _Entries(recording)
     parts = [*entries.inputs(robot)]
     if actual is not None:
-        parts.append(entries.joints(ACTUAL_JOINT_STATES.name, robot, actual, None))
+        parts.append(entries.joints(topics.ACTUAL_JOINT_STATES.name, robot, actual, None))
     if twin is not None:
-        parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
+        parts.append(entries.poses(topics.TWIN_POSE.name, recording.joints.t, *twin))
     if expected is not None:
         (position, rotation), covariance = expected
-        where = TWIN_COVARIANCE.name, recording.joints.t
+        where = topics.TWIN_COVARIANCE.name, recording.joints.t
         parts.append(entries.sure_poses(*where, position, rotation, covariance))
     if deviation is not None and recording.measured is not None and len(deviation):
-        parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
+        parts.append(entries.vectors(topics.DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made, beside=beside) as bag:
         bag.write_all(merge(*parts, key=itemgetter(0)))
 
@@ -137,7 +124,7 @@ class _Entries:
         wrench, temperature = self.recording.wrench, self.recording.temperature
         effort = self.recording.effort
         efforts = None if effort is None else effort.at(motion.t)
-        yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, efforts)
+        yield self.joints(topics.JOINT_STATES.name, robot, motion.q, motion.qd, efforts)
         if self.recording.images is not None:
             yield self.images(self.recording.images)
         elif measured is not None:
@@ -147,12 +134,12 @@ class _Entries:
         if wrench is not None:
             frame, rows = self.recording.wrench_frame, wrench.value
             first = partial(self.make.wrench, wrench=rows[0], frame_id=frame)
-            yield self._alike(TOOL_WRENCH.name, wrench.t, first, rows)
+            yield self._alike(topics.TOOL_WRENCH.name, wrench.t, first, rows)
         if temperature is not None:
             degrees = temperature.value
             rows = np.column_stack([degrees, np.zeros(degrees.size)])
             first = partial(self.make.temperature, celsius=degrees[0])
-            yield self._alike(TEMPERATURE.name, temperature.t, first, rows)
+            yield self._alike(topics.TEMPERATURE.name, temperature.t, first, rows)
 
     def joints(
         self, topic: str, robot: Robot, q: Array, qd: Array | None, effort: Array | None = None
@@ -176,16 +163,16 @@ class _Entries:
             return
         if rotation is not None and measured.noise is not None:
             known = measured.noise.covariance
-            yield self.sure_poses(MEASURED_POSE.name, measured.t, position, rotation, known)
+            yield self.sure_poses(topics.MEASURED_POSE.name, measured.t, position, rotation, known)
             return
         if rotation is not None:
-            yield self.poses(MEASURED_POSE.name, measured.t, position, rotation)
+            yield self.poses(topics.MEASURED_POSE.name, measured.t, position, rotation)
         else:
             first = partial(self.make.point, position=position[0], frame_id=WORLD)
-            yield self._alike(MEASURED_POINT.name, measured.t, first, position)
+            yield self._alike(topics.MEASURED_POINT.name, measured.t, first, position)
         if sigma is not None:
             yield self.vectors(
-                MEASURED_SIGMA.name, measured.t, np.repeat(sigma[:, None], 3, axis=1)
+                topics.MEASURED_SIGMA.name, measured.t, np.repeat(sigma[:, None], 3, axis=1)
             )
 
     def contacts(self, contacts: Contacts) -> Iterator[_Entry]:
@@ -195,14 +182,14 @@ class _Entries:
         sigma = none if contacts.sigma is None else contacts.sigma
         for k, ns in enumerate(self._stamps(self.recording.joints.t).tolist()):
             message = self.make.contact(ns, contacts.labels[k], value[k], sigma[k])
-            yield ns, CONTACT.name, message.__msgtype__, _serialised(message)
+            yield ns, topics.CONTACT.name, message.__msgtype__, _serialised(message)
 
     def images(self, seen: Sightings) -> Iterator[_Entry]:
         """Return what cameras saw, of which the poses are made again when it is read."""
         for stamp, camera, rows in rows_of(seen):
             ns = int(self._stamps(np.array([stamp]))[0])
             message = self.make.image_points(ns, camera, rows)
-            yield ns, IMAGE_POINTS.name, message.__msgtype__, _serialised(message)
+            yield ns, topics.IMAGE_POINTS.name, message.__msgtype__, _serialised(message)
 
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""

@@ -17,20 +17,9 @@ from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.assembly import Intake, Role
 from weld_twin_msgs_py.assembly.frame_names import PlannedFrame
-from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages import from_messages, topics
 from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
 from weld_twin_msgs_py.messages.goals import corrected_trajectory
-from weld_twin_msgs_py.messages.topics import (
-    AUDIT,
-    COMPENSATED,
-    CORRECTION,
-    DEVIATION,
-    JOINT_STATES,
-    POSE_IN,
-    POSE_OUT,
-    TEMPERATURE,
-    TOOL_WRENCH,
-)
 
 from ..offline.correcting import LoadedModel, loaded
 from ..streams.arm_state import ArmState, Moving
@@ -150,25 +139,25 @@ class Compensator(ManagedNode):
         self._stream: PoseStream | None = None
         self._looks: LooksBeside | None = None
         self._judge = GoalJudge(self)
-        self._out = self.offer(POSE_OUT)
+        self._out = self.offer(topics.POSE_OUT)
         self.partners.append(self._senders_beside)
-        self._correction = self.offer(CORRECTION, awaited=False)
+        self._correction = self.offer(topics.CORRECTION, awaited=False)
         self._audit = GoalAudit(self)
         self._frame = PlannedFrame(self.setting('base_frame'))
         self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
         self.answer('~/reload', self._reload)
-        self.listen(TOOL_WRENCH, self._on_wrench, hold_last=True)
-        self.listen(TEMPERATURE, self._on_temperature, hold_last=True)
-        self.listen(JOINT_STATES, self._on_joints)
-        self.listen(DEVIATION, self._on_deviation)
-        self.listen(POSE_IN, self._on_pose)
+        self.listen(topics.TOOL_WRENCH, self._on_wrench, hold_last=True)
+        self.listen(topics.TEMPERATURE, self._on_temperature, hold_last=True)
+        self.listen(topics.JOINT_STATES, self._on_joints)
+        self.listen(topics.DEVIATION, self._on_deviation)
+        self.listen(topics.POSE_IN, self._on_pose)
         self._relay = self._offer_action()
         self.every(LOOK_EVERY, self._look)
         self.start()
 
     def own_topics(self) -> list[str]:
         """Return the topics under the node's own name."""
-        return [topic.relative for topic in COMPENSATED]
+        return [topic.relative for topic in topics.COMPENSATED]
 
     def _offer_action(self) -> GoalRelay | None:
         try:
@@ -308,7 +297,7 @@ class Compensator(ManagedNode):
         if self._relay is not None:
             takers.add(self.resolve_topic_name(self._relay.below).rpartition('/')[0])
         for name in sorted(takers):
-            if self.count_publishers(f'{name}/{AUDIT.relative.removeprefix("~/")}'):
+            if self.count_publishers(f'{name}/{topics.AUDIT.relative.removeprefix("~/")}'):
                 return (
                     f'{name}, which takes what is sent, is a compensator: it would correct twice'
                 )
@@ -357,7 +346,7 @@ class Compensator(ManagedNode):
         self.remark(self._frame.remark)
 
     def _on_pose_inactive(self, message: Any) -> None:
-        self.refuse(self.resolve_topic_name(POSE_IN.relative), INACTIVE)
+        self.refuse(self.resolve_topic_name(topics.POSE_IN.relative), INACTIVE)
         if self.setting('on_refusal') == 'pass' and self.setting('apply'):
             encode, _ = self._encoder(message.header.frame_id)
             self._out.publish(
@@ -377,7 +366,7 @@ class Compensator(ManagedNode):
         if given.added is not None and self._listened:
             self._correction.publish(encode_twist(stamp, given.added))
         if given.why:
-            self.refuse(self.resolve_topic_name(POSE_IN.relative), given.why)
+            self.refuse(self.resolve_topic_name(topics.POSE_IN.relative), given.why)
         stream.settle()
 
     def _encoder(self, frame_id: str) -> tuple[PoseEncoder, TwistEncoder]:

@@ -9,14 +9,8 @@ from typing import Any, ClassVar
 
 from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
-from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages import from_messages, topics
 from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
-from weld_twin_msgs_py.messages.topics import (
-    DEVIATION,
-    DEVIATION_METRICS,
-    TWIN_BASE,
-    TWIN_POSE,
-)
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
 from .cell_node import CellNode
@@ -75,18 +69,18 @@ class DeviationAnalyzer(CellNode):
         )
         self._waiting_since: float | None = None
         self._base_timer = self.every(BASE_EVERY, self._look_for_base)
-        self._vector = self.offer(DEVIATION)
+        self._vector = self.offer(topics.DEVIATION)
         self._encode = Vector3Encoder(base_frame(self))
         self._frame = MeasuringFrame(self.setting('measuring_frame'))
-        self._metrics = self.offer(DEVIATION_METRICS, awaited=False)
+        self._metrics = self.offer(topics.DEVIATION_METRICS, awaited=False)
         self._stamp = 0
         self._seen = self._published = 0
         self._every = self.setting('metrics_every')
         self.every(self.setting('metrics_idle'), self._on_idle)
         self.every(LOOK_EVERY, self._look_at_clocks)
-        self.listen(TWIN_BASE, self._on_base)
+        self.listen(topics.TWIN_BASE, self._on_base)
         self._measured_inputs = MeasuredInputs(self, self._on_measured)
-        self.listen(TWIN_POSE, self._on_twin, required=True)
+        self.listen(topics.TWIN_POSE, self._on_twin, required=True)
 
     def time_went_back(self) -> None:
         """Forget what was not paired, and begin the metrics anew."""
@@ -117,7 +111,7 @@ class DeviationAnalyzer(CellNode):
         now = time.monotonic()
         if self._waiting_since is None:
             self._waiting_since = now
-        topic = self.resolve_topic_name(TWIN_BASE.relative)
+        topic = self.resolve_topic_name(topics.TWIN_BASE.relative)
         patience = BASE_SOMEBODY if self.count_publishers(topic) else BASE_NOBODY
         if now - self._waiting_since < patience:
             return

@@ -17,17 +17,9 @@ from weld_twin_core.diagnosis.algebra.problem import frames_named
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.assembly import Intake, Role, Samples, assembled
 from weld_twin_msgs_py.bags.images import Image
+from weld_twin_msgs_py.messages import topics
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS, stamp_ns
 from weld_twin_msgs_py.messages.image_points import points
-from weld_twin_msgs_py.messages.topics import (
-    DIAGNOSIS,
-    IMAGE_POINTS,
-    JOINT_STATES,
-    MEASURED_SIGMA,
-    TEMPERATURE,
-    TOOL_WRENCH,
-    TopicNames,
-)
 
 from ..offline.given_twin import build_twin, given_cameras
 from .diagnosis_worker import Finding, Job, Worker
@@ -162,10 +154,10 @@ LOOK_EVERY = 0.2
 LEVELS = {'none': 0, 'identified': 1, 'ambiguous': 1, 'unknown': 1, 'unsound': 2}
 """Of the diagnostic message: ok, a warning, or an error where data or set-up are wrong."""
 INPUTS = {
-    TOOL_WRENCH: Role.WRENCH,
-    TEMPERATURE: Role.TEMPERATURE,
-    MEASURED_SIGMA: Role.SIGMA,
-    JOINT_STATES: Role.JOINTS,
+    topics.TOOL_WRENCH: Role.WRENCH,
+    topics.TEMPERATURE: Role.TEMPERATURE,
+    topics.MEASURED_SIGMA: Role.SIGMA,
+    topics.JOINT_STATES: Role.JOINTS,
 }
 
 
@@ -201,18 +193,18 @@ class LiveDiagnosis(ManagedNode):
         self._seen: int | None = None
         self._speaking = False
         self._printed = ''
-        self._verdict = self.offer(DIAGNOSIS)
+        self._verdict = self.offer(topics.DIAGNOSIS)
         self._measured: MeasuredInputs | None = None
         self._looking: Any = None
         self.start()
 
-    def _looked_with(self) -> TopicNames:
+    def _looked_with(self) -> topics.TopicNames:
         texts = (
             [part for part in self.setting(name).split(',') if part]
             for name in ('cameras', 'targets')
         )
         cameras, targets = given_cameras(*texts)
-        return TopicNames(cameras=cameras, targets=targets)
+        return topics.TopicNames(cameras=cameras, targets=targets)
 
     def prepare(self) -> None:
         """Nothing is left to look at: robot and model were read when the node started."""
@@ -223,7 +215,7 @@ class LiveDiagnosis(ManagedNode):
             required, hold_last = role is Role.JOINTS, role in SIGNALS
             self.listen(topic, partial(self._take, role), required=required, hold_last=hold_last)
         if self._names.cameras:
-            self.listen(IMAGE_POINTS, self._window.take_image)
+            self.listen(topics.IMAGE_POINTS, self._window.take_image)
         self._measured = MeasuredInputs(self, self._take)
         self._looking = self.every(LOOK_EVERY, self._look)
 

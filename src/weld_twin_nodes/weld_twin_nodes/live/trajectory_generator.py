@@ -13,16 +13,8 @@ from rclpy.duration import Duration
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
-from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages import from_messages, topics
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
-from weld_twin_msgs_py.messages.topics import (
-    BY_NAME,
-    JOINT_STATES,
-    JOINT_TRAJECTORY,
-    PATH,
-    PLANNED_PATH,
-    PLANNED_TRAJECTORY,
-)
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
 from .all_nodes import MODULES
@@ -254,9 +246,9 @@ class TrajectoryGenerator(CellNode):
         self._law = self.setting('profile'), self.setting('rate'), self.setting('speed')
         self._playback = self.setting('playback')
         self._encode = JointStateEncoder(self._robot.joint_names)
-        self._publisher = self.offer(JOINT_STATES)
-        self._planned = self.offer(PLANNED_TRAJECTORY, awaited=False)
-        self._seam = self.offer(PLANNED_PATH, awaited=False)
+        self._publisher = self.offer(topics.JOINT_STATES)
+        self._planned = self.offer(topics.PLANNED_TRAJECTORY, awaited=False)
+        self._seam = self.offer(topics.PLANNED_PATH, awaited=False)
         self._stamps = np.zeros(0, dtype=np.int64)
         self._pump: Pump | None = None
         self._meeting: Meeting | None = None
@@ -274,9 +266,9 @@ class TrajectoryGenerator(CellNode):
         if source == 'plan':
             self._run(joint_motion(self._robot, self.setting('path'), *self._law))
         elif source == 'joint_trajectory':
-            self.listen(JOINT_TRAJECTORY, self._on_trajectory, required=True)
+            self.listen(topics.JOINT_TRAJECTORY, self._on_trajectory, required=True)
         else:
-            self.listen(PATH, self._on_path, required=True)
+            self.listen(topics.PATH, self._on_path, required=True)
 
     def _on_trajectory(self, message: Any) -> None:
         self._refuse_busy()
@@ -295,9 +287,9 @@ class TrajectoryGenerator(CellNode):
         name = self.setting('follow')
         if not name:
             return
-        topic = BY_NAME.get('/' + name.lstrip('/'))
+        topic = topics.BY_NAME.get('/' + name.lstrip('/'))
         if topic is None:
-            raise DataError(f'follow must be one of {", ".join(BY_NAME)}, got {name!r}')
+            raise DataError(f'follow must be one of {", ".join(topics.BY_NAME)}, got {name!r}')
         self.create_subscription(
             topic.message_class(), name, self._on_answer, topic.offered.to_rclpy()
         )

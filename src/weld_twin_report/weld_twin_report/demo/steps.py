@@ -17,18 +17,7 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
-from .analysis import (
-    MARK,
-    Job,
-    Step,
-    analyse,
-    draw,
-    find_causes,
-    leave_open,
-    rank,
-    run_live,
-    write_table,
-)
+from . import analysis
 from .closed_loop import close_loop
 
 ROBOT = 'ur5'
@@ -51,24 +40,24 @@ STILL_EFFECTS = [
 where no controller's action is installed."""
 
 
-def plan_seam(job: Job, _: object) -> None:
+def plan_seam(job: analysis.Job, _: object) -> None:
     """Plan the seam as joint motion."""
     job.plan = plan_motion(job.robot, job.seam, 'smooth', job.rate)
 
 
 STEPS = (
-    Step('plan the seam', plan_seam),
-    Step('weld it with five live nodes and record', run_live),
-    Step('compare the bag with the twin', analyse),
-    Step('rank what matters on this seam', rank),
-    Step('draw the seam', draw),
-    Step('find what the twin does not know', find_causes),
-    Step('do the same where one seam cannot tell', leave_open),
-    Step('write the table', write_table),
+    analysis.Step('plan the seam', plan_seam),
+    analysis.Step('weld it with five live nodes and record', analysis.run_live),
+    analysis.Step('compare the bag with the twin', analysis.analyse),
+    analysis.Step('rank what matters on this seam', analysis.rank),
+    analysis.Step('draw the seam', analysis.draw),
+    analysis.Step('find what the twin does not know', analysis.find_causes),
+    analysis.Step('do the same where one seam cannot tell', analysis.leave_open),
+    analysis.Step('write the table', analysis.write_table),
 )
 CLOSED_LOOP = (
     *STEPS[:-1],
-    Step('weld it again with the loop closed', close_loop),
+    analysis.Step('weld it again with the loop closed', close_loop),
     STEPS[-1],
 )
 """The same with the seam corrected by what was found."""
@@ -83,8 +72,8 @@ def run_demo(out: Path | str, *, closed_loop: bool = False, force: bool = False)
     console = Console()
     robot = catalog.load(ROBOT)
     steps, effects = (CLOSED_LOOP, STILL_EFFECTS) if closed_loop else (STEPS, EFFECTS)
-    with new_directory(out, mark=MARK, force=force) as folder:
-        job = Job(folder, robot, effects_from_list(effects, robot), SEAM, RATE, SEED)
+    with new_directory(out, mark=analysis.MARK, force=force) as folder:
+        job = analysis.Job(folder, robot, effects_from_list(effects, robot), SEAM, RATE, SEED)
         columns = TextColumn('{task.description:<40}'), BarColumn(), TimeElapsedColumn()
         with Progress(*columns, console=console) as bars:
             for step in steps:

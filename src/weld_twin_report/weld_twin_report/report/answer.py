@@ -15,6 +15,7 @@ from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.exports import elsewhere, undetermined, which_file
+from weld_twin_nodes.wording import words
 from weld_twin_nodes.wording.mending import correctable
 from weld_twin_nodes.wording.quantities import (
     change,
@@ -26,16 +27,6 @@ from weld_twin_nodes.wording.quantities import (
     turned,
 )
 from weld_twin_nodes.wording.verdict import verdict
-from weld_twin_nodes.wording.words import (
-    called,
-    cause,
-    effect_name,
-    listed,
-    mended,
-    open_sets,
-    site_name,
-    status_word,
-)
 
 from .cause_answer import CauseAnswer
 from .page_data import places, remainder
@@ -52,8 +43,8 @@ def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
     rows = []
     for family in families:
         joints = [site.joint for site, _ in family.needed if site.joint] if family.named else []
-        like = [site_name(site) for site, _ in family.like] if family.named else []
-        name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
+        like = [words.site_name(site) for site, _ in family.like] if family.named else []
+        name = words.cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
         cells = [millimetres(family.rms_m), f'{100.0 * family.growth:+.0f} %']
         rows.append([name, *cells, ', '.join(joints[:_LARGEST]), ', '.join(like)])
     return rows
@@ -145,7 +136,7 @@ class Answer:
 
     @property
     def status(self) -> str:
-        return status_word(self.diagnosis)
+        return words.status_word(self.diagnosis)
 
     @cached_property
     def verdict(self) -> tuple[str, str]:
@@ -155,7 +146,7 @@ class Answer:
     @property
     def mended(self) -> tuple[str, ...]:
         """Return what was wrong with the data and undone; all that follows stands on it."""
-        return mended(self.diagnosis)
+        return words.mended(self.diagnosis)
 
     @cached_property
     def to_do(self) -> list[str]:
@@ -225,7 +216,7 @@ class Answer:
         rows = []
         for result in whole.effects:
             values = parameter_rows(result.effect, result.std, whole.model.robot)
-            names = [effect_name(result), *[''] * len(values)]
+            names = [words.effect_name(result), *[''] * len(values)]
             rows += [[name, *row] for name, row in zip(names, values, strict=False)]
         heads = ('Effect', 'Parameter', 'Value ± standard error')
         return [Table('Effects found', heads, rows)] if rows else []
@@ -244,8 +235,8 @@ class Answer:
     @cached_property
     def open(self) -> list[str]:
         """Return what these data cannot tell apart: the names of each set."""
-        sets = open_sets(self.diagnosis)
-        return [listed([site_name(site) for site in group], 'or') for group in sets]
+        sets = words.open_sets(self.diagnosis)
+        return [words.listed([words.site_name(site) for site in group], 'or') for group in sets]
 
     @cached_property
     def changed(self) -> Table | None:
@@ -255,7 +246,7 @@ class Answer:
             return None
         names = [recording.name for recording in whole.recordings]
         rows = [
-            [names[item.recording], cause(item.effect.name, item.effect.site), *row]
+            [names[item.recording], words.cause(item.effect.name, item.effect.site), *row]
             for item in whole.changed
             for row in parameter_rows(item.effect, item.std, whole.model.robot)
         ]
@@ -265,7 +256,7 @@ class Answer:
     @property
     def nothing_changed(self) -> str:
         """Return that nothing was seen to change, of what."""
-        names = listed([called(name) for name in self.diagnosis.may_change], 'or')
+        names = words.listed([words.called(name) for name in self.diagnosis.may_change], 'or')
         return f'No {names} was seen to change between the recordings.'
 
 
@@ -280,7 +271,7 @@ def recorded_at(recordings: Sequence[Recording]) -> str:
 
 def _alternative(candidate: Candidate, best: float) -> Alternative:
     return Alternative(
-        site_name(candidate.site),
+        words.site_name(candidate.site),
         _against(candidate.probability, best),
         millimetres(candidate.rms_after_m),
         change(candidate.shrink),

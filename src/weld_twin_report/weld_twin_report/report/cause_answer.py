@@ -12,15 +12,7 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
-from weld_twin_nodes.wording.mending import (
-    Remaining,
-    against,
-    curve_fault,
-    look_at,
-    remaining_without,
-    taken_by_curve,
-    warning,
-)
+from weld_twin_nodes.wording import mending
 from weld_twin_nodes.wording.quantities import millimetres, odds, with_ends
 from weld_twin_nodes.wording.switches import alternatives, as_it_is, cause_name, trusted
 from weld_twin_nodes.wording.words import (
@@ -231,9 +223,9 @@ class CauseAnswer:
         return f'{text} ({sides}).' if sides else f'{text}.', f' RMS {rms_words(parts[good])}.'
 
     @cached_property
-    def remaining(self) -> Remaining | None:
+    def remaining(self) -> mending.Remaining | None:
         """Return what is left with it alone mended; None where it cannot be thought away."""
-        return remaining_without(self.diagnosis, self.k)
+        return mending.remaining_without(self.diagnosis, self.k)
 
     @cached_property
     def mended(self) -> tuple[str, str] | None:
@@ -248,7 +240,7 @@ class CauseAnswer:
         )
         if not unnamed(self.cause):
             return change, ''
-        short = taken_by_curve(self.diagnosis, self.k) is not None
+        short = mending.taken_by_curve(self.diagnosis, self.k) is not None
         return change, f' {_BY_CURVE}{_SHORT * short}'
 
     # What to do about it.
@@ -271,12 +263,12 @@ class CauseAnswer:
         if self.diagnosis.families and len(effects) > 1:
             return [TOGETHER]
         if unnamed(self.cause):
-            steps = look_at(self.diagnosis, self.k)
+            steps = mending.look_at(self.diagnosis, self.k)
         elif not effects:
             return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
-            warned = warning(self.diagnosis, self.k)
+            warned = mending.warning(self.diagnosis, self.k)
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), warned])
             steps = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
         if effects and self.alike:
@@ -295,10 +287,10 @@ class CauseAnswer:
         head = f'At the {BRANDS[self.brand]} controller' if self.brand else 'At the controller'
         if not self.effects:
             return head, 'Nothing can be entered before the cause is known.'
-        fault = curve_fault(self.diagnosis, self.k)
+        fault = mending.curve_fault(self.diagnosis, self.k)
         if fault:
             return head, f'Nothing is to be entered: the curve {fault}.'
-        others = against(self.diagnosis) if unnamed(self.cause) else ''
+        others = mending.against(self.diagnosis) if unnamed(self.cause) else ''
         entry = self._correction
         if others:
             # A correction is made without the curves that are advised against.
@@ -311,7 +303,7 @@ class CauseAnswer:
     @property
     def where_to_enter(self) -> str:
         """Return where the controller takes it, without the way through its menus."""
-        if curve_fault(self.diagnosis, self.k) or not self.effects:
+        if mending.curve_fault(self.diagnosis, self.k) or not self.effects:
             return 'nothing yet'
         if self.alike:
             return 'nothing before it is known which it is'

@@ -9,6 +9,7 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.metrics.conformity import Rule
+from weld_twin_nodes.wording import words
 from weld_twin_nodes.wording.quantities import (
     MISSING,
     both_angles,
@@ -19,15 +20,6 @@ from weld_twin_nodes.wording.quantities import (
     turns_only,
 )
 from weld_twin_nodes.wording.switches import MOST, cause_name, switches
-from weld_twin_nodes.wording.words import (
-    carries_curves,
-    cause,
-    in_words,
-    listed,
-    open_sets,
-    parameter_word,
-    same_words,
-)
 
 from .acceptance import mark
 from .answer import Answer
@@ -263,7 +255,9 @@ def _found(answer: Answer) -> Html | None:
     parts: list[Html] = []
     for k, (title, heads, rows) in enumerate(answer.found):
         if not answer.diagnosis.families:
-            rows = [[name, parameter_word(parameter), *rest] for name, parameter, *rest in rows]
+            rows = [
+                [name, words.parameter_word(parameter), *rest] for name, parameter, *rest in rows
+            ]
         parts += [tag('h3', title), table(heads, rows, '' if k else 'effects')]
     if answer.diagnosis.families:
         parts.insert(2, tag('p.note', _KINDS))
@@ -291,7 +285,7 @@ def _candidates(answer: Answer) -> Html | None:
     note = tag('p.note', f'{more} more in diagnosis.json.') if more > 0 else None
     if not named:
         title = 'What fits best, though no cause is named'
-        lead = _INSTEAD if carries_curves(diagnosis) else _STAND_IN
+        lead = _INSTEAD if words.carries_curves(diagnosis) else _STAND_IN
     else:
         title = 'Candidates against each other'
         lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
@@ -303,8 +297,8 @@ def _sets(answer: Answer) -> Html | None:
     diagnosis = answer.diagnosis
     if not diagnosis.effects:
         return None
-    every = {site for group in open_sets(diagnosis) for site in group}
-    reasons = sentences(in_words(reason, every) for reason in diagnosis.reasons)
+    every = {site for group in words.open_sets(diagnosis) for site in group}
+    reasons = sentences(words.in_words(reason, every) for reason in diagnosis.reasons)
     if answer.open:
         guess = sentences(
             f'{names}: naming one of them would be a guess.' for names in answer.open
@@ -313,7 +307,7 @@ def _sets(answer: Answer) -> Html | None:
     elif diagnosis.families:
         parts = [reasons]
     elif diagnosis.same:
-        parts = [sentences(same_words(diagnosis))]
+        parts = [sentences(words.same_words(diagnosis))]
     else:
         none = f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'
         parts = [tag('p', none.rstrip())]
@@ -338,8 +332,8 @@ def _left_out(effect: str, why: str, diagnosis: Diagnosis) -> tuple[str, str]:
     if joints:
         if 'source' in getattr(REGISTRY.get(effect), 'options', ()):
             reason = reason.replace('the joint hardly', 'the joint beside it hardly')
-        return cause(effect, listed(joints)), reason
-    return cause(effect, None), why
+        return words.cause(effect, words.listed(joints)), reason
+    return words.cause(effect, None), why
 
 
 def leftover(diagnosis: Diagnosis) -> Html:
@@ -352,7 +346,7 @@ def leftover(diagnosis: Diagnosis) -> Html:
             f'What remains, {millimetres(rest.rms_m)}, depends on nothing that was '
             f'looked at, but the instrument is better than that: {millimetres(floor)}.',
         )
-    if carries_curves(diagnosis) and rest.rms_m <= _ABOVE * floor:
+    if words.carries_curves(diagnosis) and rest.rms_m <= _ABOVE * floor:
         return joined(
             [
                 tag('p', 'What no known effect explains, and the curves carry, depends on:'),
@@ -376,7 +370,7 @@ def _with(diagnosis: Diagnosis) -> str:
     """Return what was taken off, where it has no name."""
     if diagnosis.effects or diagnosis.families or not diagnosis.model.found:
         return ''
-    return 'With the curves, ' if carries_curves(diagnosis) else 'With what fits best, '
+    return 'With the curves, ' if words.carries_curves(diagnosis) else 'With what fits best, '
 
 
 def _dependent(structure: Sequence[str]) -> Html:
@@ -451,4 +445,4 @@ def _judged(diagnosis: Diagnosis) -> str:
 
 def _readable(name: str) -> str:
     effect, _, joint = name.partition(' of ')
-    return cause(effect, joint or None)
+    return words.cause(effect, joint or None)

@@ -22,26 +22,11 @@ from ..history import entry_of
 from ..history.database import Database
 from ..history.entry import instant
 from ..history.runs import Runs
+from . import job as jobs
 from .directory import NO_ROOM, Directory, giving_way, is_full, size_of
-from .job import (
-    DONE,
-    FAILED,
-    FOUND,
-    IMPORTED,
-    MODEL,
-    OPEN,
-    PROGRAM,
-    REFUSED,
-    RUNNING,
-    UNSOUND,
-    UPLOADS,
-    WAITING,
-    Asked,
-    Job,
-)
 from .settings import Settings
 
-STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
+STATES = {0: jobs.DONE, 2: jobs.REFUSED, 3: jobs.UNSOUND}
 """By the exit code of a command; any other is a failure."""
 HISTORY = 'history.db'
 NOT_ADDED = 'not in the history: '
@@ -73,21 +58,21 @@ class Queue:
         for worker in self._workers:
             worker.start()
 
-    def _kept(self) -> list[Job]:
+    def _kept(self) -> list[jobs.Job]:
         """Return the jobs of the folders; what was running waits again."""
         out = []
         for folder in self._directory.kept():
             try:
-                job = Job.read(folder)
+                job = jobs.Job.read(folder)
             except DataError as error:
                 print(f'weld-twin: {error}; it is left as it is', file=sys.stderr, flush=True)
                 continue
-            if job.state in OPEN:
-                job = replace(job, state=WAITING, said='')
+            if job.state in jobs.OPEN:
+                job = replace(job, state=jobs.WAITING, said='')
             out.append(job)
         return out
 
-    def folder(self, job: Job) -> Path:
+    def folder(self, job: jobs.Job) -> Path:
         return self._directory.jobs / job.key
 
     def user_folder(self, user: str) -> Path:
@@ -100,13 +85,13 @@ class Queue:
             mine = any(job.user == user for job in self._jobs.values())
         return mine or self.user_folder(user).is_dir()
 
-    def check_room(self, job: Job) -> None:
+    def check_room(self, job: jobs.Job) -> None:
         """Refuse, by Full, a job more of a user, or new ones of his address, or of all."""
         with self._news:
             self._check_room(job)
 
-    def _check_room(self, job: Job) -> None:
-        waiting = [each for each in self._jobs.values() if each.state in OPEN]
+    def _check_room(self, job: jobs.Job) -> None:
+        waiting = [each for each in self._jobs.values() if each.state in jobs.OPEN]
         if sum(each.user == job.user for each in waiting) >= self._settings.own:
             raise Full(
                 f'{self._settings.own} of your recordings wait already; let them finish first'
@@ -121,7 +106,7 @@ class Queue:
         if len(waiting) >= self._settings.waiting:
             raise Full('too many recordings wait; try again later')
 
-    def add(self, job: Job) -> None:
+    def add(self, job: jobs.Job) -> None:
         """Take a new job whose files are in its folder; raise Full, NoRoom or OSError."""
         size, allowed = size_of(self.folder(job)), self._settings.disk
         with self._news:
@@ -130,7 +115,7 @@ class Queue:
             going = giving_way(
                 others, {**self._sizes, job.key: size}, job, allowed, self._settings.kept_of_all
             )
-            finished = [each for each in others if each.state not in OPEN]
+            finished = [each for each in others if each.state not in jobs.OPEN]
             mine = sorted((j for j in finished if j.user == job.user), key=lambda j: -j.since)
             job.write(self.folder(job))
             self._jobs[job.key], self._sizes[job.key] = job, size
@@ -138,21 +123,21 @@ class Queue:
         for each in (*going, *mine[self._settings.kept :]):
             self.remove(each)
 
-    def again(self, job: Job, asked: Asked) -> None:
+    def again(self, job: jobs.Job, asked: jobs.Asked) -> None:
         """Ask for the same files in another way, now or after what is in work."""
         with self._news:
             if job.key not in self._jobs:
                 return  # it was deleted
             job = self._jobs[job.key]
-            if job.state == RUNNING:
+            if job.state == jobs.RUNNING:
                 self._put(replace(job, later=asked))
                 return
-            if job.state != WAITING:
+            if job.state != jobs.WAITING:
                 self._check_room(job)
             self._put(job.ask(asked))
             self._news.notify()
 
-    def remove(self, job: Job) -> None:
+    def remove(self, job: jobs.Job) -> None:
         """Forget a job and delete its files; what it computes ends with nothing."""
         with self._news:
             self._jobs.pop(job.key, None)
@@ -160,7 +145,7 @@ class Queue:
             self._unwritten.discard(job.key)
         folder = self.folder(job)
         # Its state goes last: what is cut off on the way can be deleted again.
-        for place in (UPLOADS, IMPORTED, FOUND, MODEL):
+        for place in (jobs.UPLOADS, jobs.IMPORTED, jobs.FOUND, jobs.MODEL):
             shutil.rmtree(folder / place, ignore_errors=True)
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -170,32 +155,32 @@ class Queue:
             self.remove(job)
         shutil.rmtree(self.user_folder(user), ignore_errors=True)
 
-    def of(self, user: str) -> list[Job]:
+    def of(self, user: str) -> list[jobs.Job]:
         """Return the jobs of a user, the newest first."""
         with self._news:
             mine = [job for job in self._jobs.values() if job.user == user]
         return sorted(mine, key=lambda job: -job.since)
 
-    def get(self, key: str, user: str) -> Job | None:
+    def get(self, key: str, user: str) -> jobs.Job | None:
         """Return a job of a user; None where there is none, or it is of another."""
         with self._news:
             job = self._jobs.get(key)
         return job if job is not None and job.user == user else None
 
-    def place(self, job: Job) -> int:
+    def place(self, job: jobs.Job) -> int:
         """Return how many come before a job that waits."""
         with self._news:
-            running = sum(each.state == RUNNING for each in self._jobs.values())
+            running = sum(each.state == jobs.RUNNING for each in self._jobs.values())
             order = [each.key for each in self._in_turn()]
         return running + order.index(job.key) if job.key in order else 0
 
-    def _in_turn(self) -> list[Job]:
+    def _in_turn(self) -> list[jobs.Job]:
         """Return what waits: first one of each party, then the next one of each."""
         rank: Counter[str] = Counter()
         order = []
         for job in sorted(self._jobs.values(), key=lambda job: job.since):
-            if job.state in OPEN:
-                if job.state == WAITING:
+            if job.state in jobs.OPEN:
+                if job.state == jobs.WAITING:
                     order.append((rank[job.party], job.since, job))
                 rank[job.party] += 1
         return [job for _, _, job in sorted(order, key=lambda each: each[:2])]
@@ -210,7 +195,7 @@ class Queue:
             worker.join(timeout=5.0)
         self._directory.close()
 
-    def _put(self, job: Job) -> None:
+    def _put(self, job: jobs.Job) -> None:
         """Keep a job; where the disk is full it is kept here, and written as soon as that goes."""
         self._jobs[job.key] = job
         try:
@@ -230,12 +215,12 @@ class Queue:
                     return  # what was ended with the server is not finished
                 self._finish(job, done)
 
-    def _next(self) -> Job | None:
+    def _next(self) -> jobs.Job | None:
         """Wait for a job and take it; None when the server stops."""
         with self._news:
             while not self._stopped:
                 if waiting := self._in_turn():
-                    job = replace(waiting[0], state=RUNNING, said='')
+                    job = replace(waiting[0], state=jobs.RUNNING, said='')
                     self._jobs[job.key] = job
                     return job
                 self._news.wait(LOOK)
@@ -243,11 +228,11 @@ class Queue:
                     self._put(self._jobs[key])
         return None
 
-    def _run(self, job: Job, guarded: Guarded) -> Outcome:
+    def _run(self, job: jobs.Job, guarded: Guarded) -> Outcome:
         folder = self.folder(job)
-        shutil.rmtree(folder / IMPORTED, ignore_errors=True)
-        if job.kind == PROGRAM:
-            shutil.rmtree(folder / FOUND, ignore_errors=True)
+        shutil.rmtree(folder / jobs.IMPORTED, ignore_errors=True)
+        if job.kind == jobs.PROGRAM:
+            shutil.rmtree(folder / jobs.FOUND, ignore_errors=True)
 
         def tell(text: str) -> None:
             with self._news:
@@ -262,15 +247,15 @@ class Queue:
                 break
         return replace(done, seconds=seconds)
 
-    def _finish(self, job: Job, done: Outcome) -> None:
+    def _finish(self, job: jobs.Job, done: Outcome) -> None:
         """Note how a job ended, and what comes of it."""
-        state = STATES.get(done.code, FAILED)
+        state = STATES.get(done.code, jobs.FAILED)
         said = _plain(done.said.removeprefix('weld-twin: '), job)
         if done.disk_full:
-            state, said = FAILED, NO_ROOM
-        if state == UNSOUND:
+            state, said = jobs.FAILED, NO_ROOM
+        if state == jobs.UNSOUND:
             said = 'data or set-up are wrong: it asks what to do'
-        if state == DONE:
+        if state == jobs.DONE:
             said = self._into_history(job) if job.asked.cell else ''
         size = size_of(self.folder(job))
         with self._news:
@@ -282,18 +267,20 @@ class Queue:
             ended = replace(now, state=state, said=said, seconds=done.seconds)
             self._put(ended.ask(now.later) if now.later is not None else ended)
 
-    def into_history(self, job: Job) -> None:
+    def into_history(self, job: jobs.Job) -> None:
         """Add a diagnosis to its history once more, where it could not be added."""
         said = self._into_history(job)
         with self._news:
             if job.key in self._jobs:
                 self._put(replace(self._jobs[job.key], said=said))
 
-    def _into_history(self, job: Job) -> str:
+    def _into_history(self, job: jobs.Job) -> str:
         """Add a diagnosis to the history of its user; return what came of it."""
         asked = job.asked
         try:
-            entry = entry_of(self.folder(job) / FOUND, instant(asked.at) if asked.at else None)
+            entry = entry_of(
+                self.folder(job) / jobs.FOUND, instant(asked.at) if asked.at else None
+            )
             place = self.user_folder(job.user)
             with self._news:
                 if job.key not in self._jobs:
@@ -308,7 +295,7 @@ class Queue:
                 database.close()
         except Exception as error:  # the diagnosis is there all the same
             why = NO_ROOM if is_full(error) or 'is full' in str(error) else _why(error)
-            why = why.replace(str(self.folder(job) / FOUND), '').replace(
+            why = why.replace(str(self.folder(job) / jobs.FOUND), '').replace(
                 f'sqlite:///{self.user_folder(job.user).absolute()}/', ''
             )
             return f'{NOT_ADDED}{_plain(why, job)}'
@@ -326,8 +313,11 @@ def _why(error: Exception) -> str:
     return f'the server could not do it: {type(error).__name__}: {error}'
 
 
-def _plain(text: str, job: Job) -> str:
+def _plain(text: str, job: jobs.Job) -> str:
     """Return a sentence without the places in a job's folder."""
-    for place in (job.uploads(Path()), *map(Path, ('recording', IMPORTED, FOUND, 'model'))):
+    for place in (
+        job.uploads(Path()),
+        *map(Path, ('recording', jobs.IMPORTED, jobs.FOUND, 'model')),
+    ):
         text = text.replace(f'{place}/', '')
     return text

@@ -8,16 +8,7 @@ returns the exit code and raises a TwinError for anything the user can mend. A m
 command runs, not for its help. Options that few need are rare: `--help` fits on one screen without them.
 """
 
-from ..options import (
-    BAG_OUTPUT,
-    CAMERAS,
-    PROGRAM,
-    ROBOT,
-    TABLE,
-    TOPICS,
-    TRIGGER,
-    file_output,
-)
+from .. import options
 from ..parsing import Command
 
 OF_SEAM = """
@@ -50,12 +41,12 @@ _SIMULATE = Command(
     'weld-twin simulate --robot ur5 --effects bags/elbow_play.yaml --path spline --out my_bag',
     (
         '[BAG]                    recording with joint states; left out, a seam is simulated',
-        ROBOT,
+        options.ROBOT,
         '--model FILE             effects that the twin knows: diagnosis.json, or an effects file',
-        BAG_OUTPUT,
+        options.BAG_OUTPUT,
         OF_SEAM,
         OF_RECORDING,
-        TOPICS,
+        options.TOPICS,
     ),
 )
 _DETECT = Command(
@@ -73,7 +64,7 @@ IMAGE ...                images, or a folder of them
 --camera NAME            what the table calls the camera [default: camera]
 --joints FILE.csv        joint angles of every image
 """,
-        file_output('table to write'),
+        options.file_output('table to write'),
     ),
 )
 _IMPORT = Command(
@@ -86,16 +77,16 @@ _IMPORT = Command(
     'weld-twin import examples/files/measurements.csv --robot ur5 --out my_cell',
     (
         'FILE.csv                 table of text',
-        ROBOT,
-        BAG_OUTPUT,
+        options.ROBOT,
+        options.BAG_OUTPUT,
         """
 --contacts ARTEFACT.yaml  FILE.csv has joint angles and what was touched; this file describes it
 rare:
 --table CSV              also write every deviation from the twin
 --picture PNG            also draw the deviations
 """,
-        CAMERAS,
-        TABLE,
+        options.CAMERAS,
+        options.TABLE,
     ),
 )
 _BAG = Command(
@@ -114,7 +105,7 @@ _BAG = Command(
 [BAG]                    rosbag2 directory, .mcap or .db3
 --robots                 list the bundled robots and your own instead
 """,
-                TOPICS,
+                options.TOPICS,
             ),
         ),
         'recover': Command(
@@ -154,7 +145,7 @@ rare:
         ),
     },
 )
-_OUT = file_output('file to write (default: print it)')
+_OUT = options.file_output('file to write (default: print it)')
 _EXPORT = Command(
     """A corrected model, a robot program, a policy, a schema.
 
@@ -168,7 +159,7 @@ _EXPORT = Command(
             'weld-twin export model found/diagnosis.json --robot ur5 --format offsets',
             (
                 'MODEL                    diagnosis.json',
-                ROBOT,
+                options.ROBOT,
                 """
 --format {yaml,urdf,offsets,effects,left-over}  yaml, urdf: the corrected robot; offsets: a CSV, a
                          row a joint; effects: all, for the nominal robot; left-over: those that a
@@ -186,19 +177,19 @@ _EXPORT = Command(
             'weld-twin export program spline --robot ur5 --controller urscript --out seam.script',
             (
                 'PATH                     path file, experiment, or a bundled seam such as line',
-                ROBOT,
+                options.ROBOT,
                 """
 --controller NAME, required  urscript, krl, rapid, inform, fanuc-ls, joint-trajectory or csv
 """,
-                file_output('program to write'),
+                options.file_output('program to write'),
                 """
 --full-speed             after the first run: joints at most half speed, tool 250 mm/s, not a tenth
                          and 50 mm/s
 --speed V                of a seam, such as 8mm/s; left out, its own
 --dwell S                stay at each station [default: 2]
 """,
-                TRIGGER,
-                PROGRAM,
+                options.TRIGGER,
+                options.PROGRAM,
             ),
         ),
         'policy': Command(

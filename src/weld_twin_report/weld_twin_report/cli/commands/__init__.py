@@ -2,19 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands that write pages; `weld_twin_nodes.cli.commands` says what a row and a module here have."""
 
-from weld_twin_nodes.cli.options import (
-    ALIGN,
-    ANY_ROBOT,
-    FORCE,
-    POOL,
-    PROGRAM,
-    RARE_TABLE,
-    ROBOT,
-    STORAGE,
-    TOPICS,
-    TRIGGER,
-    folder_output,
-)
+from weld_twin_nodes.cli import options
 from weld_twin_nodes.cli.parsing import Command
 
 BRANDS = ('abb', 'fanuc', 'kuka', 'ur', 'yaskawa')
@@ -57,12 +45,12 @@ _DIAGNOSE = Command(
     'weld-twin diagnose my_bag --robot ur5 --align base,tool --out found',
     (
         'BAG ...                  bags or tables of one robot',
-        ROBOT,
-        folder_output('directory for the results'),
+        options.ROBOT,
+        options.folder_output('directory for the results'),
         f"""
 how it was measured:
 --holdout BAG            a recording that is not fitted; the shrink is judged on it; may be given again
-{ALIGN}
+{options.ALIGN}
 --may-change NAMES       errors that may differ between the recordings, such as
                          joint_offset,tool_pose,base_pose
 --apply                  if data or set-up are wrong and one correction explains it, make it and go on
@@ -97,8 +85,8 @@ rare:
 --cell-box NUMBERS       x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm
                          stays between them
 """,
-        TOPICS,
-        RARE_TABLE,
+        options.TOPICS,
+        options.RARE_TABLE,
     ),
 )
 _INVESTIGATE = Command(
@@ -116,7 +104,7 @@ _INVESTIGATE = Command(
 [DIR]                    the investigation
 [BAG ...]                recordings to begin or go on with
 """,
-        ANY_ROBOT,
+        options.ANY_ROBOT,
         """
 --budget MIN             minutes of experiments (default: 60)
 --align FRAMES           as for diagnose
@@ -130,10 +118,10 @@ rare:
 --cell-box NUMBERS       as for diagnose
 --playback X             with --live: speed against real time [default: 1]
 """,
-        FORCE,
+        options.FORCE,
         OF_PLAN,
-        TRIGGER,
-        PROGRAM,
+        options.TRIGGER,
+        options.PROGRAM,
     ),
 )
 _CORRECT = Command(
@@ -146,13 +134,13 @@ _CORRECT = Command(
     'weld-twin correct seam.script --robot ur5 --model found/diagnosis.json --out better',
     (
         'PROGRAM|BAG  program (a .dat is found beside it), or a bag with the nominal joint commands',
-        ROBOT,
+        options.ROBOT,
         '--model FILE             diagnosis.json, or an effects file',
-        folder_output('directory of results; of a bag, the bag to write'),
+        options.folder_output('directory of results; of a bag, the bag to write'),
         OF_PROGRAM,
-        PROGRAM,
-        STORAGE,
-        TOPICS,
+        options.PROGRAM,
+        options.STORAGE,
+        options.TOPICS,
     ),
 )
 _VERIFY = Command(
@@ -170,7 +158,7 @@ AFTER_BAG                recorded after the correction
 --model FILE, required   diagnosis.json that the correction is from
 --program DIR            folder that correct wrote, where a program was corrected
 """,
-        ANY_ROBOT,
+        options.ANY_ROBOT,
         """
 --align FRAMES           frames that were set up anew since the diagnosis, and are fitted: base, tool,
                          or base,tool (default: both are as they were)
@@ -178,8 +166,8 @@ AFTER_BAG                recorded after the correction
 rare:
 --setup N                which recording of the diagnosis [default: 1]
 """,
-        FORCE,
-        TOPICS,
+        options.FORCE,
+        options.TOPICS,
     ),
 )
 _ISO9283 = Command(
@@ -191,10 +179,10 @@ _ISO9283 = Command(
     'weld-twin iso9283 my_cycles --robot ur5 --out accuracy',
     (
         'BAG                      recording of the cell',
-        ROBOT,
-        ALIGN,
-        folder_output('directory for the results'),
-        TOPICS,
+        options.ROBOT,
+        options.ALIGN,
+        options.folder_output('directory for the results'),
+        options.TOPICS,
     ),
 )
 _SENSITIVITY = Command(
@@ -208,8 +196,8 @@ _SENSITIVITY = Command(
     'weld-twin sensitivity --robot ur5 --path spline --out study',
     (
         '[BAG]                    study the motion recorded in a bag',
-        ANY_ROBOT,
-        folder_output('directory for the results'),
+        options.ANY_ROBOT,
+        options.folder_output('directory for the results'),
         """
 what is studied:
 --path P                 path file, or line, arc, circle, polyline, spline, weave [default: line]
@@ -236,7 +224,7 @@ rare:
 --workers N              processes (default: one a core)
 --scheduler ADDRESS      Dask scheduler to run on instead
 """,
-        TOPICS,
+        options.TOPICS,
     ),
 )
 _SERVE = Command(
@@ -272,7 +260,7 @@ _DEMO = Command(
     'The whole job on an example: live nodes, a bag, a page.',
     'weld-twin demo --out out',
     (
-        folder_output('directory for the results', default='out'),
+        options.folder_output('directory for the results', default='out'),
         '--closed-loop  weld the seam again through the compensator, and show both beside each other',
     ),
 )
@@ -338,12 +326,12 @@ _HISTORY = Command(
             harms no other.
             """,
             'weld-twin history run examples/files/cells.csv --db plant.db',
-            ('LIST                     table of recordings', _DATABASE, POOL, _RUN),
+            ('LIST                     table of recordings', _DATABASE, options.POOL, _RUN),
         ),
         'page': Command(
             'Write a page that ranks cells, and one for each cell.',
             'weld-twin history page --db plant.db --out plant',
-            (_DATABASE, folder_output('directory for the pages')),
+            (_DATABASE, options.folder_output('directory for the pages')),
         ),
     },
 )

@@ -341,7 +341,7 @@ def test_a_recorder_takes_the_type_of_a_publisher_that_comes_after_it(cell, othe
 
 
 def test_measurements_beyond_those_that_may_wait_are_refused_and_counted(cell, other, monkeypatch):
-    monkeypatch.setattr('weld_twin_nodes.live.tf_frames.MOST', 5)
+    monkeypatch.setattr('weld_twin_nodes.live.robot_settings.MOST', 5)
     tracked = TrackedCell(cell, other)
     moving = tf(placed(T_WORLD_TRACKER, S, 'world', 'tracker'))
     tracked.wait_told(

@@ -28,8 +28,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.yaml_file import yaml_text
-from weld_twin_msgs_py.messages.cdr_read import HEADER
-from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
+from weld_twin_msgs_py.messages.cdr import HEADER, JointStateEncoder
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, POSE_OUT, TWIN_POSE
 from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.harness.process import own_domain

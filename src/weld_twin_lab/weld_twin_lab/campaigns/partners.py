@@ -36,8 +36,7 @@ from rclpy.task import Future
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
-from weld_twin_msgs_py.messages.cdr_read import HEADER
-from weld_twin_msgs_py.messages.cdr_write import PoseEncoder
+from weld_twin_msgs_py.messages.cdr import HEADER, PoseEncoder
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
 from weld_twin_nodes.live.run_node import LOOP, executor

@@ -23,8 +23,8 @@ from weld_twin_msgs_py.messages.from_messages import stamp_ns
 from weld_twin_msgs_py.messages.topics import DIAGNOSIS, JOINT_STATES
 from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.harness.process import own_domain
-from weld_twin_nodes.live.all_nodes import MODULES
 from weld_twin_nodes.live.policy import HEAD, TAIL, enclave, policy
+from weld_twin_nodes.live.settings import MODULES
 
 from . import party
 from .secured import keystore, secured_middleware

@@ -11,12 +11,14 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.cdr_read import READERS, JointStateDecoder, decoder
-from weld_twin_msgs_py.messages.cdr_write import (
+from weld_twin_msgs_py.messages.cdr import (
+    READERS,
+    JointStateDecoder,
     JointStateEncoder,
     PoseCovarianceEncoder,
     PoseEncoder,
     Vector3Encoder,
+    decoder,
 )
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES, decode

@@ -10,7 +10,7 @@ import pytest
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointSignal
 from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recording, write_recording
-from weld_twin_msgs_py.messages.cdr_read import decoder
+from weld_twin_msgs_py.messages.cdr import decoder
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import TopicNames
 from weld_twin_msgs_py.messages.typestore import TYPES

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.assembly.transforms import NoTransform, NotYet, TransformTree
-from weld_twin_msgs_py.messages.cdr_read import (
+from weld_twin_msgs_py.assembly.frames import NoTransform, NotYet, TransformTree
+from weld_twin_msgs_py.messages.cdr import (
     Header,
     TFMessage,
     Time,

@@ -9,7 +9,7 @@ import weld_twin_core as wt
 from weld_twin_core.errors import ModelError
 from weld_twin_core.twin.corrected import corrected
 from weld_twin_msgs_py.robots import load_robot, read_urdf, write_robot_yaml, write_urdf
-from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
+from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 
 BRANCHES = (
     # name, kind, parent, child, xyz, rpy, axis

@@ -16,7 +16,7 @@ from weld_twin_core.errors import ModelError
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.twin.corrected import corrected
 from weld_twin_msgs_py.robots import load_robot, write_robot_yaml, write_urdf
-from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
+from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 
 MOVES = (
     ('j1', 'root', 'a', '0 0 0.4', '{axis}'),

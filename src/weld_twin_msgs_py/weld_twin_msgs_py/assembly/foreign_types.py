@@ -12,9 +12,9 @@ from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from ..messages.cdr_read import Header, Pose, PoseStamped, Xyz, Xyzw
+from ..messages.cdr import Header, Pose, PoseStamped, Xyz, Xyzw
 from ..messages.topics import JOINT_STATES, MEASURED_POSE
-from .frame_names import WORLD
+from .frames import WORLD
 from .joint_states import JointStates
 
 Plain = Callable[[Any, str], Iterator[Any]]

@@ -4,11 +4,10 @@
 
 from .contents import BagInfo, TopicInfo, bag_info
 from .from_bag import read_recording
-from .growing import BackgroundBag, GrowingBag
 from .reader import BagReader, provenance
 from .rebuild import Recovery, recover
 from .to_bag import write_recording
-from .writer import BagWriter
+from .writers import BackgroundBag, BagWriter, GrowingBag
 
 __all__ = [
     'BackgroundBag',

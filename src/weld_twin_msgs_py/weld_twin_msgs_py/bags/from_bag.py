@@ -21,8 +21,16 @@ from ..assembly.foreign_types import FedBack, plain_messages, plain_poses, split
 from ..assembly.joint_states import names_called
 from ..messages.from_messages import stamp_ns
 from ..messages.topics import CONTACT, TopicNames
-from . import needed
 from .images import images, looking
+from .needed import (
+    TYPES,
+    Ends,
+    never_recorded,
+    no_joints,
+    no_measurements,
+    other_names,
+    uneven_ends,
+)
 from .reader import BagReader
 from .regular import LEFT_OUT, Stream, fill_regular
 
@@ -148,12 +156,12 @@ def read_recording(
         touched = marks(bag, names)
         seen = [] if touched else images(bag, names)
         if needs_measurements and not (touched or seen or {Role.POSE, Role.POINT} & set(roles)):
-            raise DataError(f"bag '{path}': {needed.no_measurements(names, bag.topics)}")
+            raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
         raise DataError(
             f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
             f'{robot.name!r}: {", ".join(robot.joint_names)}'
-            f'{needed.other_names(robot, tuple(intake.joints.strangers))}'
+            f'{other_names(robot, tuple(intake.joints.strangers))}'
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
     whole = assembled(
@@ -189,10 +197,10 @@ def _inverted(recording: Recording, names: TopicNames) -> Recording:
 
 
 def _with_what_is_missing(
-    recording: Recording, made: Mapping[str, Any], ends: Mapping[str, needed.Ends]
+    recording: Recording, made: Mapping[str, Any], ends: Mapping[str, Ends]
 ) -> Recording:
-    lacking = needed.never_recorded(made)
-    uneven = () if recording.joints.static else needed.uneven_ends(ends)
+    lacking = never_recorded(made)
+    uneven = () if recording.joints.static else uneven_ends(ends)
     return replace(
         recording,
         incomplete=(*lacking, *uneven),
@@ -201,10 +209,10 @@ def _with_what_is_missing(
     )
 
 
-def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, needed.Ends]:
+def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, Ends]:
     """Return the ends of what a comparison cannot do without: joint states and measurements."""
     return {
-        getattr(names, role.value): needed.Ends(
+        getattr(names, role.value): Ends(
             int(item.ns[0]), int(item.ns[-1]), int(np.median(np.diff(item.ns)))
         )
         for role, item in samples.items()
@@ -219,8 +227,8 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Ro
     defaults = {topic for usual in TopicNames.topics() for topic in (usual, f'{space}{usual}')}
     for role, topic in list(roles.items()):
         kind, count = present.get(topic, ('', 0))
-        if role is Role.JOINTS and (count == 0 or kind not in needed.TYPES[role]):
-            raise DataError(f'the bag has {needed.no_joints(names, present)}')
+        if role is Role.JOINTS and (count == 0 or kind not in TYPES[role]):
+            raise DataError(f'the bag has {no_joints(names, present)}')
         if count == 0:
             if topic not in defaults:
                 listed = ', '.join(f"'{t}'" for t, (_, c) in sorted(present.items()) if c)
@@ -228,10 +236,10 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Ro
                     f"the bag has no message on '{topic}'; its topics are {listed or 'all empty'}"
                 )
             del roles[role]
-        elif kind not in needed.TYPES[role]:
+        elif kind not in TYPES[role]:
             raise DataError(
                 f"topic '{topic}' has the type {kind}, but this use needs "
-                + ' or '.join(needed.TYPES[role])
+                + ' or '.join(TYPES[role])
             )
     if Role.POSE in roles:
         roles.pop(Role.POINT, None)

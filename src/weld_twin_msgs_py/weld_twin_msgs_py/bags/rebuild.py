@@ -26,11 +26,9 @@ from weld_twin_core.errors import DataError
 
 from ..files.whole_files import followed
 from ..messages.typestore import TYPES, decode, types_with
-from .growing import NOTES, UNFINISHED, is_growing, lock, unfinished
-from .reader import unlz4, unzstd
+from .reader import look, storage_files, unlz4, unzstd
 from .segment import SUFFIXES, Channel, Segments, clear_write_errors, sync
-from .storage import look, storage_files
-from .writer import custom_data
+from .writers import NOTES, UNFINISHED, custom_data, is_growing, lock, unfinished
 
 Salvaged = tuple[Channel, int, bytes]
 """Channel, time of recording [ns] and serialised message."""

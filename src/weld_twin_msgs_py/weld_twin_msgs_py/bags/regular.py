@@ -19,12 +19,11 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import COLDEST, HOTTEST
 
 from ..assembly import Intake, Role, Samples
-from ..assembly.frame_names import OtherFrame
-from ..assembly.intake import UNIT
+from ..assembly.frames import OtherFrame
+from ..assembly.intake import UNIT, Late
 from ..assembly.joint_states import Incomplete, Missing
-from ..assembly.stamp_order import Late
+from ..messages.cdr import Layout, layout_of
 from ..messages.from_messages import NANOSECONDS, VARIANCES, Unstamped
-from ..messages.layout import Layout, layout_of
 from .reader import BagReader
 
 MOST = 300

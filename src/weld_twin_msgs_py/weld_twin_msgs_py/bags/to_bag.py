@@ -19,14 +19,14 @@ from weld_twin_core.cameras import Sightings
 from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
-from ..assembly.frame_names import WORLD
+from ..assembly.frames import WORLD
 from ..messages import topics
+from ..messages.cdr import layout_of
 from ..messages.from_messages import NANOSECONDS
-from ..messages.layout import layout_of
 from ..messages.to_messages import Messages, bag_messages
 from ..messages.typestore import TYPES
 from .images import rows_of
-from .writer import BagWriter
+from .writers import BagWriter
 
 _Entry = tuple[int, str, str, bytes]
 ROWS = 1_000

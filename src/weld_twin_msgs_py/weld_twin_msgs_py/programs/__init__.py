@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot programs in the languages of their makers, read, changed in some points, and written."""
 
-from .build import Program, to_moves
-from .context import Context
-from .controllers import Controller, controller_of
+from .build import Program, check_written, rewritten, to_moves
+from .controllers import Context, Controller, controller_of
 from .languages import LANGUAGES, read_program, read_sources
-from .rewrite import check_written, rewritten
 
 __all__ = [
     'LANGUAGES',

@@ -21,11 +21,9 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .blocks import Blocks, unclear_shift
 from .build import TURNS, WRIST, Program, Ref, Step, flags_kept
-from .context import Context
-from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .controllers import Context, Frame
+from .reader import LEAST_SPEED, Blocks, Reader, unclear_shift
 from .source import FANUC_POSE, NUMBER, Notation, Number, Source, closing
 
 POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')

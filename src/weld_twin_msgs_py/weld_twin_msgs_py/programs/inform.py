@@ -23,11 +23,9 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .blocks import Blocks, unclear_shift
 from .build import TURNS, Program, Ref, Step, flags_kept
-from .context import Context
-from .controllers import Frame
-from .reader import LEAST_SPEED, Handler, Reader
+from .controllers import Context, Frame
+from .reader import LEAST_SPEED, Blocks, Handler, Reader, unclear_shift
 from .source import YASKAWA_POSE, Notation, Number, Source
 
 _NAMED = re.compile(r'^//NAME[ \t]+([^\r\n]*\S)', re.M)

@@ -26,11 +26,9 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
-from .context import Context
-from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .controllers import Context, Frame
+from .reader import LEAST_SPEED, Blocks, Frames, Reader, unclear, unclear_shift
 from .source import KUKA_POSE, NUMBER, Number, Source, closing, number_at, split_outside, stripped
 
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}

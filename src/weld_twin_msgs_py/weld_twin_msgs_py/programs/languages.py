@@ -11,7 +11,7 @@ from typing import NamedTuple
 from weld_twin_core.errors import DataError
 
 from .build import Program
-from .context import Context
+from .controllers import Context
 from .fanuc_ls import FanucReader
 from .inform import InformReader
 from .joint_points import CSV_POSE, CsvReader, TrajectoryReader

@@ -28,7 +28,6 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .blocks import Blocks, unclear_shift
 from .build import (
     WRIST,
     Program,
@@ -40,9 +39,8 @@ from .build import (
     hold_if_used_elsewhere,
     quadrants,
 )
-from .context import Context
-from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .controllers import Context, Frame
+from .reader import LEAST_SPEED, Blocks, Reader, unclear_shift
 from .source import ABB_POSE, Number, Source, closing, split_outside, stripped
 
 NO_AXIS = 8.9e9

@@ -24,11 +24,9 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .blocks import Blocks, Frames, unclear, unclear_shift
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
-from .context import Context
-from .controllers import Frame
-from .reader import LEAST_SPEED, Reader
+from .controllers import Context, Frame
+from .reader import LEAST_SPEED, Blocks, Frames, Reader, unclear, unclear_shift
 from .source import UR_POSE, Notation, Number, Source, closing, stripped
 
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {

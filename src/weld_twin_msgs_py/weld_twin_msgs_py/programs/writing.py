@@ -14,8 +14,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from ..files.csv_text import guarded
-from .context import Context
-from .controllers import ExternalAxis
+from .controllers import Context, ExternalAxis
 from .source import ABB_POSE, KUKA_POSE, UR_POSE
 
 

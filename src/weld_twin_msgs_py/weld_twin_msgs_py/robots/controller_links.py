@@ -26,8 +26,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
-from .axes_to_dh import inverse
-from .urdf_tree import MOVABLE, Joint, Tree
+from .urdf_tree import MOVABLE, Joint, Tree, inverse
 
 BASE, FLANGE = 'controller_base', 'controller_flange'
 """Links of files of our own; a URDF that has them says what is meant."""

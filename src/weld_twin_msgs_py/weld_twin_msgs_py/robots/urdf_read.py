@@ -14,9 +14,18 @@ from weld_twin_core.arm.robot import STANDARD_GRAVITY, Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
-from .axes_to_dh import Axis, dh_rows, inverse
 from .controller_links import FLANGE, FixedLink, flange_link_of, foot_of
-from .urdf_tree import CORRECTED, MOVABLE, Joint, Tree, parse_tree, read_tree
+from .urdf_tree import (
+    CORRECTED,
+    MOVABLE,
+    Axis,
+    Joint,
+    Tree,
+    dh_rows,
+    inverse,
+    parse_tree,
+    read_tree,
+)
 
 _TURN = 2.0 * np.pi + 1e-6
 """A whole turn [rad], and what rounding may add."""

@@ -3,9 +3,8 @@
 """Tables of joint angles and measured positions or poses, as laboratories leave them."""
 
 from .build import Table, read_table
-from .camera_files import read_camera, read_target
+from .cameras import read_camera, read_pixels, read_target
 from .contacts import read_contacts, write_touches
-from .pixels import read_pixels
 from .two_tables import read_two_tables
 from .words import TableOptions
 

@@ -15,8 +15,8 @@ import yaml
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from weld_twin_nodes.live.all_nodes import MODULES, node_class
 from weld_twin_nodes.live.policy import enclave
+from weld_twin_nodes.live.settings import MODULES, node_class
 
 PACKAGE = Path(__file__).parents[2]
 LAUNCH = ('cell', 'demo')

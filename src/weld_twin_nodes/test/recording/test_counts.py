@@ -18,8 +18,7 @@ from weld_twin_msgs_py.bags.segment import Channel
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES
-from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall
-from weld_twin_nodes.live.recorded_topic import definition
+from weld_twin_nodes.live.recorded import NEW, SentBook, definition, shortfall
 from weld_twin_nodes.live.trajectory_generator import apart, beyond
 from weld_twin_nodes.live.words import Book, Sent, word
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from weld_twin_msgs_py.files.input_files import InputFile
     from weld_twin_msgs_py.messages.topics import TopicNames
     from weld_twin_msgs_py.programs import Context
-    from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+    from weld_twin_msgs_py.robots.urdf_write import GivenUrdf
     from weld_twin_msgs_py.tables import Table, TableOptions
 
 _UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 1.0}
@@ -61,7 +61,7 @@ class Given(argparse.Namespace):
     def find_urdf(self) -> GivenUrdf | None:
         """Return the URDF that the robot was read from, None for another robot file."""
         from weld_twin_msgs_py.robots.load import URDF_SUFFIXES
-        from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+        from weld_twin_msgs_py.robots.urdf_write import GivenUrdf
 
         path = Path(self.robot)
         return GivenUrdf(path, *self.links) if path.suffix.lower() in URDF_SUFFIXES else None

@@ -13,7 +13,7 @@ from rclpy.task import Future
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.twin.goal_motion import Goal, course
-from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
+from weld_twin_msgs_py.messages.cdr import JointStateEncoder
 from weld_twin_msgs_py.messages.goals import read_goal
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
 

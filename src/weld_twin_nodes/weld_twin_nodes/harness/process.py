@@ -20,7 +20,7 @@ import yaml
 
 from weld_twin_core.errors import TwinError
 
-from ..live.all_nodes import MODULES
+from ..live.settings import MODULES
 from ..offline.environment import environment
 
 DOMAINS = range(1, 102)

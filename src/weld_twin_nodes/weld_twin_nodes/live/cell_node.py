@@ -31,9 +31,8 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..streams.stamp_watch import StampWatch
-from .all_nodes import refuse_unknown
 from .health import Input, Output
-from .settings import SHARED, QosOverrides, Setting
+from .settings import SHARED, QosOverrides, Setting, refuse_unknown
 from .source import Source, Wanted, full_names, unreached_subscribers
 from .telling_node import TellingNode
 from .words import ALIVE, reader

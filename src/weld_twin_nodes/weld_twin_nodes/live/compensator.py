@@ -16,19 +16,17 @@ from weld_twin_core.twin.goal_correction import CorrectedGoal, GoalLimits, Refus
 from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.assembly import Intake, Role
-from weld_twin_msgs_py.assembly.frame_names import PlannedFrame
+from weld_twin_msgs_py.assembly.frames import PlannedFrame
 from weld_twin_msgs_py.messages import from_messages, topics
-from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
+from weld_twin_msgs_py.messages.cdr import PoseEncoder, TwistEncoder
 from weld_twin_msgs_py.messages.goals import corrected_trajectory
 
 from ..offline.correcting import LoadedModel, loaded
-from ..streams.arm_state import ArmState, Moving
 from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
-from ..streams.supervision import Supervision
+from ..streams.supervision import ArmState, Moving, Supervision
 from .cell_node import CellNode
-from .goal_judge import GoalAudit, GoalJudge, Judged
-from .goal_relay import Decision, GoalRelay
+from .goals import Decision, GoalAudit, GoalJudge, GoalRelay, Judged
 from .managed_node import ManagedNode
 from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of, say_doubts
 from .run_node import run

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.assembly.stamp_order import Forward
+from weld_twin_msgs_py.assembly.intake import Forward
 from weld_twin_msgs_py.files.csv_text import csv_text, unguarded
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import CONTACT, JOINT_STATES

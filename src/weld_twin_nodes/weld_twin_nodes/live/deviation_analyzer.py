@@ -8,16 +8,22 @@ from functools import partial
 from typing import Any, ClassVar
 
 from weld_twin_msgs_py.assembly import Role
-from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
+from weld_twin_msgs_py.assembly.frames import MeasuringFrame
 from weld_twin_msgs_py.messages import from_messages, topics
-from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
+from weld_twin_msgs_py.messages.cdr import Vector3Encoder
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
 from .cell_node import CellNode
-from .robot_settings import JOINT_SETTINGS, MEASURED_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of
+from .robot_settings import (
+    JOINT_SETTINGS,
+    MEASURED_SETTINGS,
+    ROBOT_SETTINGS,
+    MeasuredInputs,
+    base_frame,
+    robot_of,
+)
 from .run_node import run
 from .settings import Setting
-from .tf_frames import MeasuredInputs
 
 LOOK_EVERY = 0.5
 """Seconds between two looks at the clocks."""

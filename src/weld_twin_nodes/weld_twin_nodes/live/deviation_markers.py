@@ -19,12 +19,12 @@ from .robot_settings import (
     JOINT_SETTINGS,
     MEASURED_SETTINGS,
     ROBOT_SETTINGS,
+    MeasuredInputs,
     measuring_frame,
     robot_of,
 )
 from .run_node import run
 from .settings import Setting
-from .tf_frames import MeasuredInputs
 
 WAITING = 2000
 """Measured positions that wait for their deviation."""

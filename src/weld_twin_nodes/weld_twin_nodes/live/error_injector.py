@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder
+from weld_twin_msgs_py.messages.cdr import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
 from ..streams.twin_stream import Noise, Sample

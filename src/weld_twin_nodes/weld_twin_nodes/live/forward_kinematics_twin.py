@@ -8,7 +8,7 @@ from typing import Any
 from weld_twin_core.twin.live_posterior import LivePosterior
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
-from weld_twin_msgs_py.messages.cdr_write import PoseCovarianceEncoder, PoseEncoder
+from weld_twin_msgs_py.messages.cdr import PoseCovarianceEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_COVARIANCE, TWIN_POSE
 

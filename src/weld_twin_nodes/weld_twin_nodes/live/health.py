@@ -10,7 +10,7 @@ from typing import Any
 
 from rclpy.duration import Duration
 
-from weld_twin_msgs_py.messages.cdr_read import first_time_ns
+from weld_twin_msgs_py.messages.cdr import first_time_ns
 from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.to_messages import Status
 

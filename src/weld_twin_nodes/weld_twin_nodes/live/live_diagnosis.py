@@ -28,12 +28,12 @@ from .robot_settings import (
     JOINT_SETTINGS,
     MEASURED_SETTINGS,
     ROBOT_SETTINGS,
+    MeasuredInputs,
     place_twin,
     robot_of,
 )
 from .run_node import run
 from .settings import Setting
-from .tf_frames import MeasuredInputs
 
 LONGEST = 50_000
 """Samples of a stream kept at most, whatever its rate."""

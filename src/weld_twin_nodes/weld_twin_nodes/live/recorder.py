@@ -17,13 +17,20 @@ from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.bags.needed import COMPLETENESS
-from weld_twin_msgs_py.messages.cdr_read import decoder
+from weld_twin_msgs_py.messages.cdr import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION, TOPICS
 
 from .cell_node import CellNode
-from .completeness import AT_START, AskedNodes, SentBook, Shortfall, shortfall
 from .managed_node import ManagedNode
-from .recorded_topic import RecordedTopic, offered_channel
+from .recorded import (
+    AT_START,
+    AskedNodes,
+    RecordedTopic,
+    SentBook,
+    Shortfall,
+    offered_channel,
+    shortfall,
+)
 from .run_node import run
 from .settings import Setting
 from .source import full_names, named

@@ -23,8 +23,8 @@ from rclpy.task import Future
 
 from weld_twin_core.errors import ModelError, TwinError
 
-from .all_nodes import usage
 from .cell_node import CellNode
+from .settings import usage
 
 USAGE_ERROR = 2
 """Exit code of a command that was given something wrong."""

@@ -14,14 +14,13 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.messages import from_messages, topics
-from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
+from weld_twin_msgs_py.messages.cdr import JointStateEncoder
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
-from .all_nodes import MODULES
 from .cell_node import CellNode
 from .robot_settings import ROBOT_SETTINGS, measuring_frame, robot_of
 from .run_node import run
-from .settings import Setting
+from .settings import MODULES, Setting
 from .words import Book
 
 QUIET = 1.0

@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message
 
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
+from weld_twin_msgs_py.messages.cdr import READERS, decoder
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, JOINT_STATES, message_class
 
 SENT, REACHED, HEARD, RUN, NODE = 'sent', 'reached', 'heard', 'run', 'node'

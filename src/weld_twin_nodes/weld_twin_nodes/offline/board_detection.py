@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.messages.image_points import label
-from weld_twin_msgs_py.tables.camera_files import board_points
+from weld_twin_msgs_py.tables.cameras import board_points
 
 DICTIONARY = 'DICT_5X5_100'
 """Markers of a ChArUco board of which nothing is said."""

@@ -21,8 +21,8 @@ from weld_twin_msgs_py.files.effects_file import head_of
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.robots import write_robot_yaml, write_urdf
-from weld_twin_msgs_py.robots.urdf_like import GivenUrdf, write_urdf_like
 from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
+from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 
 AS_GOOD = 1.1
 """Ratio of what a robot file leaves to what the whole model leaves up to which either may be taken: less

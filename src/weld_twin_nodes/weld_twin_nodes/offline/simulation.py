@@ -16,7 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
+from weld_twin_msgs_py.assembly.frames import BASE, WORLD
 from weld_twin_msgs_py.bags import BagWriter
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS

@@ -14,7 +14,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.metrics.deviation import RunningMetrics
-from weld_twin_msgs_py.assembly.stamp_order import Forward
+from weld_twin_msgs_py.assembly.intake import Forward
 
 from .stamp_watch import ClockWatch
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
-from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER
+from weld_twin_msgs_py.assembly.intake import RESTART_AFTER
 
 NANOSECOND = 1e-9
 ALIVE = 1.5

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 from weld_twin_core.diagnosis.verdict.decision import NO_GAP, UNEVEN
 
-from .mending import advised, remaining_with
+from .mending import advised, remaining_with, switches
 from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
-from .switches import switches
 from .words import (
     HALF,
     called,

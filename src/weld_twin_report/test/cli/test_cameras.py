@@ -15,7 +15,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY
-from weld_twin_msgs_py.bags.writer import BagWriter
+from weld_twin_msgs_py.bags.writers import BagWriter
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_nodes.cli.in_process import weld_twin
 

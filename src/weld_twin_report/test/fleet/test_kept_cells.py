@@ -9,8 +9,7 @@ import pytest
 
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, Entry
-from weld_twin_report.history.runs import Run, Runs
-from weld_twin_report.history.verifications import Verified, put_verified
+from weld_twin_report.history.runs import Run, Runs, Verified, put_verified
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 

@@ -12,8 +12,8 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Check, Site, Traces, Unsound
 from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.wording.mending import cause_name, switches
 from weld_twin_nodes.wording.quantities import small_turn, turned, with_ends
-from weld_twin_nodes.wording.switches import cause_name, switches
 from weld_twin_report.cli.commands import BRANDS as CHOICES
 from weld_twin_report.report import report_page
 from weld_twin_report.report.controllers import BRANDS, brand_of

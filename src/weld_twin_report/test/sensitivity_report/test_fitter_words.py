@@ -4,7 +4,7 @@
 
 import pytest
 
-from weld_twin_report.sensitivity_report.fitter_words import advised, parameter_words, sized
+from weld_twin_report.sensitivity_report.study_page import advised, parameter_words, sized
 
 NORMAL = {'distribution': 'normal', 'mean': 0.0, 'std': 1e-3}
 ROWS = [

@@ -10,9 +10,8 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.errors import TwinError
 from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
 from weld_twin_core.metrics.performance import Performance, performance_of
-from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets
+from weld_twin_nodes.wording.mending import advised, remaining_with, switch_sets, switches, trusted
 from weld_twin_nodes.wording.quantities import millimetres
-from weld_twin_nodes.wording.switches import switches, trusted
 from weld_twin_nodes.wording.words import capital, listed, unnamed
 
 from .html import Html, joined, section, table, tag

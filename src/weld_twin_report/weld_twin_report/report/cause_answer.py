@@ -13,8 +13,8 @@ from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_nodes.wording import mending
+from weld_twin_nodes.wording.mending import alternatives, as_it_is, cause_name, trusted
 from weld_twin_nodes.wording.quantities import millimetres, odds, with_ends
-from weld_twin_nodes.wording.switches import alternatives, as_it_is, cause_name, trusted
 from weld_twin_nodes.wording.words import (
     CURVES,
     DEPENDENCES,

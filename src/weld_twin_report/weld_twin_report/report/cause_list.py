@@ -10,6 +10,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_nodes.wording import words
+from weld_twin_nodes.wording.mending import MOST, cause_name, switches
 from weld_twin_nodes.wording.quantities import (
     MISSING,
     both_angles,
@@ -19,7 +20,6 @@ from weld_twin_nodes.wording.quantities import (
     shrink_ratio,
     turns_only,
 )
-from weld_twin_nodes.wording.switches import MOST, cause_name, switches
 
 from .acceptance import mark
 from .answer import Answer

@@ -9,8 +9,8 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.circle import Circle, circle_of
 from weld_twin_core.recording import Recording
+from weld_twin_nodes.wording.mending import as_it_is, trusted
 from weld_twin_nodes.wording.quantities import millimetres
-from weld_twin_nodes.wording.switches import as_it_is, trusted
 
 from .html import Html, section, tag
 from .page_data import along, drawn, static

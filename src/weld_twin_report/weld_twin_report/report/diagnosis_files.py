@@ -16,7 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import json_text, write_text
-from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+from weld_twin_msgs_py.robots.urdf_write import GivenUrdf
 from weld_twin_nodes.offline.exports import where_it_holds, write_all
 
 from .diagnosis_page import Sheet, report_page

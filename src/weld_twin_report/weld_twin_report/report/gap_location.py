@@ -8,8 +8,8 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import REGISTRY
+from weld_twin_nodes.wording.mending import as_it_is
 from weld_twin_nodes.wording.quantities import millimetres, percent, seconds
-from weld_twin_nodes.wording.switches import as_it_is
 from weld_twin_nodes.wording.words import DEPENDENCES, HALF, REGIMES, likely, listed, place_name
 
 from .answer import Answer

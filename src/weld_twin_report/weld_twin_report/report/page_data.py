@@ -10,8 +10,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
+from weld_twin_nodes.wording.mending import as_it_is, parted, switches, trusted
 from weld_twin_nodes.wording.quantities import fine, millimetres
-from weld_twin_nodes.wording.switches import as_it_is, parted, switches, trusted
 
 from .charts import thinned
 

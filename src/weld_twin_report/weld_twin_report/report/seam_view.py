@@ -5,9 +5,8 @@
 import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
-from weld_twin_nodes.wording.mending import remaining_with
+from weld_twin_nodes.wording.mending import as_it_is, parted, remaining_with, switches, trusted
 from weld_twin_nodes.wording.quantities import counted, millimetres, percent
-from weld_twin_nodes.wording.switches import as_it_is, parted, switches, trusted
 from weld_twin_nodes.wording.words import listed
 
 from .charts import Axis, Line, chart

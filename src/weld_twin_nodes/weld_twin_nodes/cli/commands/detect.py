@@ -6,7 +6,7 @@ from pathlib import Path
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.csv_text import csv_text
-from weld_twin_msgs_py.tables.camera_files import read_board
+from weld_twin_msgs_py.tables.cameras import read_board
 from weld_twin_msgs_py.tables.cells import read_cells
 
 from ...offline.board_detection import detector

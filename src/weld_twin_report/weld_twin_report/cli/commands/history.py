@@ -21,8 +21,16 @@ from weld_twin_nodes.wording.words import cause
 
 from ...history import Database, observations, words
 from ...history.entry import Entry, entry_of, instant
-from ...history.runs import DONE, FAILED, REFUSED, Run
-from ...history.verifications import Verified, put_verified, verifications, verified_of
+from ...history.runs import (
+    DONE,
+    FAILED,
+    REFUSED,
+    Run,
+    Verified,
+    put_verified,
+    verifications,
+    verified_of,
+)
 from .. import limits, progress
 
 if TYPE_CHECKING:

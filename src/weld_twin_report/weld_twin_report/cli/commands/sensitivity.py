@@ -140,8 +140,8 @@ def _claims_robots(given: Given) -> list[Robot]:
 
 
 def _print_summary(place: Path) -> None:
-    from ...sensitivity_report.fitter_words import advised, parameter_words
     from ...sensitivity_report.study_files import CLAIMS, RESULT
+    from ...sensitivity_report.study_page import advised, parameter_words
 
     if (place / RESULT).is_file():
         for motion, result in json.loads((place / RESULT).read_text())['motions'].items():

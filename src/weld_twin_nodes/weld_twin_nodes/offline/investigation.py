@@ -260,8 +260,13 @@ def take_in(
         asked = rounds[-1]['asked']
         spent += float(asked['minutes'])
         rounds[-1] = {**rounds[-1], 'asked': {**asked, 'decided': decided(asked, result)}}
+    # What was diagnosed counts, whatever has taken its place meanwhile.
+    read = {each['path']: {'sha256': each['sha256']} for each in result.get('inputs') or ()}
     new = [
-        {**hashed('recording', Path(bag).resolve())._asdict(), 'changed': changes} for bag in bags
+        hashed('recording', Path(bag).resolve())._asdict()
+        | read.get(str(bag), {})
+        | {'changed': changes}
+        for bag in bags
     ]
     step: dict[str, Any] = {'recordings': new, 'believed': believed(result), 'asked': None}
     out = {**state, 'rounds': [*rounds, step], 'spent_min': spent}

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An investigation asks for what decides, keeps within its budget, and says why it ends."""
 
+from hashlib import sha256
+
 import pytest
 
 from weld_twin_core.errors import DataError
@@ -148,6 +150,17 @@ def test_what_was_changed_in_the_cell_is_remembered(tmp_path, kept):
     )
     assert changed(state) == {str(bags[1].resolve()): 'load=4'}
     kept('changed', investigation_page(state))
+
+
+def test_a_recording_that_was_replaced_while_it_was_diagnosed_is_refused_next_time(tmp_path):
+    bag = tmp_path / 'monday'
+    bag.write_text('another')
+    read = {'use': 'recording', 'path': str(bag), 'sha256': sha256(b'monday').hexdigest()}
+    state = take_in(begin('ur5', [], 60.0), [str(bag)], {**found(), 'inputs': [read]})
+    with pytest.raises(DataError, match='has changed since'):
+        recordings(state)
+    bag.write_text('monday')
+    assert recordings(state) == ([str(bag.resolve())], [])
 
 
 def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path, kept):

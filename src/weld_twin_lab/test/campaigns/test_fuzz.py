@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError, ModelError, PathError, TwinError
-from weld_twin_lab.campaigns import hunt
+from weld_twin_lab.campaigns import fuzz
 from weld_twin_lab.campaigns.broken_files import targets
-from weld_twin_lab.campaigns.hunt import harms, try_one
+from weld_twin_lab.campaigns.fuzz import harms, try_one
 from weld_twin_msgs_py.bags.reader import unlz4, unzstd, zstd
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects
@@ -48,7 +48,7 @@ few = settings(
 @pytest.mark.parametrize('name', targets())
 def test_a_broken_file_is_read_or_refused_in_a_sentence(name):
     found = {}
-    tally = hunt.hunt(name, SEED, CASES, found)
+    tally = fuzz.hunt(name, SEED, CASES, found)
     assert found == {}
     assert tally.right + tally.refused == CASES
     assert tally.refused > 0

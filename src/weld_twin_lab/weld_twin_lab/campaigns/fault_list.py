@@ -21,7 +21,7 @@ from weld_twin_msgs_py.messages.topics import (
     Topic,
 )
 
-from .fault_cells import RATE, Bench, S
+from .fault_scenes import RATE, Bench, S
 
 TAKE_JOINTS = ('forward_kinematics_twin', 'error_injector', 'live_diagnosis')
 LEASE = 25.0

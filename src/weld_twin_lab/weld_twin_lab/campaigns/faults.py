@@ -22,9 +22,8 @@ from weld_twin_msgs_py.messages.topics import DEVIATION, MEASURED_POSE, TWIN_POS
 from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.harness import Cell
 
-from .fault_cells import NODES, Bench
 from .fault_list import JOINT_FAULTS, OTHER_FAULTS, Fault
-from .fault_scenes import SCENES, play
+from .fault_scenes import NODES, SCENES, Bench, play
 
 PUBLISHED = {
     'forward_kinematics_twin': TWIN_POSE.name,

@@ -5,7 +5,7 @@
 from functools import partial
 from typing import Any
 
-from weld_twin_core.twin.live_posterior import LivePosterior
+from weld_twin_core.twin.posterior import LivePosterior
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.messages.cdr import PoseCovarianceEncoder, PoseEncoder

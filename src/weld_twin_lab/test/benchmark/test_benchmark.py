@@ -11,6 +11,7 @@ import pytest
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.errors import DataError
+from weld_twin_lab.benchmark.all_races import written_out
 from weld_twin_lab.benchmark.peers import find_peers
 from weld_twin_lab.benchmark.race import (
     DH_KEYS,
@@ -24,7 +25,6 @@ from weld_twin_lab.benchmark.race import (
     race,
     random_positions,
     short,
-    written_out,
 )
 from weld_twin_nodes.cli import main
 

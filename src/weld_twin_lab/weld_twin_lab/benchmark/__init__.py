@@ -19,7 +19,7 @@ from ..study import Study
 def run(study: Study) -> None:
     os.environ.update(dict.fromkeys(THREADS, '1'))  # read by libraries when they are imported
 
-    from .race import FULL, QUICK, benchmark
+    from .all_races import FULL, QUICK, benchmark
 
     sizes = QUICK if study.args.quick else FULL
     with study.args.output('benchmark.json') as folder:

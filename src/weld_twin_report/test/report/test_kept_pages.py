@@ -26,6 +26,7 @@ from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.wording.mending import remaining_without
 from weld_twin_report.report import print_summary, report_page, sections
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 from weld_twin_report.report.diagnosis_page import Sheet
 from weld_twin_report.report.sections import Demand
@@ -309,6 +310,20 @@ def each_kind_doubted():
     )
     said = {'causes': causes, 'families': families, 'confidence': 0.2}
     return replace(case, status='ambiguous', indistinguishable=(), **said)
+
+
+def test_kinds_that_take_nothing_off_are_not_listed_as_found():
+    case = each_kind_doubted()
+    ripple = next(f for f in case.families if f.effect == 'transmission_ripple')
+    less = replace(ripple, rms_m=0.0, growths=(-0.4, -0.3), named=False)
+    rest = tuple(f for f in case.families if f is not ripple)
+    (before, by_joint), (after,) = (
+        Answer(each).found for each in (case, replace(case, families=(*rest, less)))
+    )
+    assert by_joint.title == 'Transmission ripple by joint'
+    assert [row[0] for row in before.rows if row[0] != 'transmission ripple'] == [
+        row[0] for row in after.rows
+    ]
 
 
 AT_REST = 'the joint hardly moves (wrist_1_joint)'

@@ -210,9 +210,13 @@ class Answer:
         """Return the effects with their parameters, or the kinds of many small errors."""
         whole = self.diagnosis
         if whole.families:
-            kinds = Table('Errors found, by kind', FAMILY_HEADS, family_rows(whole.families))
-            ripple = Table('Transmission ripple by joint', RIPPLE_HEADS, ripple_rows(whole))
-            return [kinds, *([ripple] if ripple.rows else [])]
+            # What was fitted along and takes nothing off unseen data was not found.
+            families = tuple(family for family in whole.families if family.rms_m > 0.0)
+            kinds = Table('Errors found, by kind', FAMILY_HEADS, family_rows(families))
+            ripples = any(family.effect == TransmissionRipple.name for family in families)
+            lines = ripple_rows(whole) if ripples else []
+            ripple = Table('Transmission ripple by joint', RIPPLE_HEADS, lines)
+            return [each for each in (kinds, ripple) if each.rows]
         rows = []
         for result in whole.effects:
             values = parameter_rows(result.effect, result.std, whole.model.robot)

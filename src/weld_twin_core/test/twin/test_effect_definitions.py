@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every effect against its definition, written a second time as loops over plain matrices."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from usual_effects import OF_CELLS, bundled
 
+from weld_twin_core.arm.controller_frames import ControllerFrames
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_core.effects.hooks import highest_order
 from weld_twin_core.errors import ModelError
@@ -429,6 +430,30 @@ def test_effect_does_what_its_definition_says(
         expected = cell.pose()
         np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=room)
         np.testing.assert_allclose(found.rotation[k], expected[:3, :3], atol=1e-9)
+
+
+def test_a_pedestal_leans_about_where_the_arm_stands(arm, make_recording):
+    foot = np.eye(4)
+    foot[:3, 3] = [0.3, -0.2, 0.8]
+    standing = replace(arm, controller=ControllerFrames(foot=foot))
+    recording = replace(make_recording(arm), wrench=None)
+    leaning = effect('pedestal_tilt', compliance=[1e-6, 1e-6])
+    nominal = Twin(arm).poses(recording)
+
+    def turned(robot):
+        """Return where the tool went, and how the base turned."""
+        found = Twin(robot, [leaning]).poses(recording)
+        turn = found.rotation @ np.swapaxes(nominal.rotation, -1, -2)
+        return found.position - nominal.position, Rotation.from_matrix(turn).as_rotvec()
+
+    moved, turn = turned(standing)
+    base = arm.T_world_base
+    stands = (base @ foot)[:3, 3]
+    np.testing.assert_allclose(moved, np.cross(turn, nominal.position - stands), atol=1e-7)
+    weight = (arm.mass.sum() + arm.payload_mass) * base[:3, :3] @ arm.gravity
+    more = base[:3, :3].T @ np.cross(base[:3, 3] - stands, weight)
+    expected = base[:3, :3] @ [1e-6 * more[0], 1e-6 * more[1], 0.0]
+    np.testing.assert_allclose(turn - turned(arm)[1], np.tile(expected, (len(turn), 1)), atol=1e-8)
 
 
 def test_a_wrench_in_the_base_frame_yields_along_the_tools_axes(arm, make_recording, stamps):

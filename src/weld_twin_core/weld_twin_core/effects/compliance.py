@@ -196,7 +196,7 @@ class PedestalTilt(LinearEffect):
         title='leaning pedestal',
         meaning="the pedestal under the robot bends under the arm's weight",
         formula='the base leans about its x and y by compliance · moment about each, the moment'
-        ' of links, declared payload and wrench about its origin',
+        ' of links, declared payload and wrench about where the arm stands',
         apart={'joint_compliance': 'put a level or a dial gauge on the base while the arm moves'},
         entered='program',
         depends_on='load',
@@ -245,25 +245,35 @@ class PedestalTilt(LinearEffect):
 
 
 def base_moments(view: View) -> tuple[Array, Array]:
-    """Return the moments about the base's x and y that the arm and its load make, (..., N) [N m]."""
+    """Return the moments about the foot's x and y that the arm and its load make, (..., N) [N m]."""
     robot, chain = view.robot, view.frames
-    foot = pad(components(chain.root_point), chain.position.ndim - 1)
+    standing = chain.root_point + chain.root_rotation @ _standing(robot)
+    foot = pad(components(standing), chain.position.ndim - 1)
     moment = carried_moment(robot, chain, robot.behind, foot, view.wrench, view.wrench_frame)
     axes = wrench_rotation(robot, chain, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
     return x, y
 
 
+def _standing(robot: Robot) -> Array:
+    """Return where the arm stands in the frame where its rows begin, (3,) [m]: it leans about that."""
+    return np.zeros(3) if robot.behind else np.asarray(robot.T_base_foot[:3, 3])
+
+
 def base_leans(robot: Robot, axes: Array) -> list[dict[Channel, float]]:
     """
-    Return the channels that turn an arm's base about axes (K, 3) of its frame through its origin.
+    Return the channels that turn an arm's base about axes (K, 3) of its frame through its foot.
 
     Beside a positioner a lean of the arm is that of the positioner the other way round: the frames
     between the two are all that the chain has.
     """
     if not robot.behind:
-        turned = axes @ robot.T_world_base[:3, :3].T
-        return [{('base', 3 + k): float(axis[k]) for k in range(3)} for axis in turned]
+        rotation = robot.T_world_base[:3, :3]
+        turned, standing = axes @ rotation.T, rotation @ _standing(robot)
+        return [
+            {('base', k): float(v) for k, v in enumerate([*np.cross(standing, axis), *axis]) if v}
+            for axis in turned
+        ]
     foot = np.linalg.inv(robot.T_root_base)[:3, 3]
     return [
         {('root', k): float(value) for k, value in enumerate([*-np.cross(axis, foot), *-axis])}

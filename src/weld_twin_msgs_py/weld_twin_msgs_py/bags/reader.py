@@ -129,7 +129,9 @@ def _within(file: Path) -> dict[str, str]:
     with suppress(Exception):  # of what is damaged the messages tell, or there is nothing to tell
         if file.suffix == '.mcap':
             with file.open('rb') as stream:
-                records = make_reader(stream).iter_metadata()
+                reader = make_reader(stream)
+                # Without a summary it would unpack all chunks on the way, however large they get.
+                records = reader.iter_metadata() if reader.get_summary() else ()
                 texts = [each.metadata['serialized_metadata'] for each in records]
         else:
             with closing(sqlite3.connect(f'{file.absolute().as_uri()}?mode=ro', uri=True)) as base:

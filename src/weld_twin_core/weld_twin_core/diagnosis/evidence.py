@@ -175,6 +175,8 @@ class Evidence:
     wandered: tuple[float, ...] = ()
     """How far the values of every effect move from fold to fold, over what noise makes them: a
     formula that stands in for another wants other values in every fold."""
+    shown: tuple[float, ...] = ()
+    """How many standard errors every effect is from nothing beside all small errors of an arm."""
     missed: tuple[tuple[float, ...], ...] = ()
     """By what share the error of every part left out grows without every effect, all others fitted
     anew: one that stands in for another makes some part better."""

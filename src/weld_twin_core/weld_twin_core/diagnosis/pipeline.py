@@ -29,7 +29,7 @@ from .levels.curved import choose_model, curved, locate_gap, no_noise
 from .levels.gathered import gathered
 from .many.fitted_together import fitted_together
 from .many.weighed_families import Weighed, weighed_families
-from .predicting.allowed import allowed, elsewhere
+from .predicting.allowed import allowed, elsewhere, shown_beside_others
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink, Structure
 from .soundness.efforts import with_sign
@@ -209,6 +209,9 @@ def _conclude(
     weighed = weighed_families(result, unseen, beliefs) if result.dense else None
     families = None if weighed is None else weighed.families
     evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs, with_strays)
+    if not result.dense:
+        shown = shown_beside_others(result.problem, result.final.model, result.scale)
+        evidence = replace(evidence, shown=shown)
     table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)

@@ -87,6 +87,7 @@ TERMS: dict[str, dict[str, int]] = {
         'wander over size': -1,
         'missed': 1,
         'least missed': 1,
+        'shown beside others': 1,
         'left at its joint': -1,
         'constant': 0,
         'angle': 0,

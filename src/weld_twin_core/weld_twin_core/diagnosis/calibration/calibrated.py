@@ -83,13 +83,15 @@ def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stat
     if evidence.families is not None:
         return Stated(table, (), None, situation, errors)
     sizes = [size / evidence.noise for size in evidence.sizes]
-    each = list(zip(table, sizes, evidence.wandered, evidence.missed, strict=False))
+    each = list(
+        zip(table, sizes, evidence.wandered, evidence.missed, evidence.shown, strict=False)
+    )
     on = evidence.structure.depends_on
     every = []
-    for row, size, wandered, missed in each:
+    for row, size, wandered, missed, shown in each:
         beside = [one for one, *_ in each if one is not row]
         travel = _travel(evidence, row)
-        every.append(of_name(row, size, wandered, missed, beside, on, travel))
+        every.append(of_name(row, size, wandered, missed, beside, on, travel, shown))
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
         return Stated(table, (), None, situation, errors)

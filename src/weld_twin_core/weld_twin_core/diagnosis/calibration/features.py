@@ -95,6 +95,7 @@ def of_name(
     beside: Sequence[Row] = (),
     left_at: Sequence[str] = (),
     travel: float = np.inf,
+    shown: float = np.nan,
 ) -> Numbers:
     """
     Return the features of the name of an effect found, from its row of the table of answers.
@@ -105,6 +106,7 @@ def of_name(
     beside: rows of the other effects found.
     left_at: what the most of what is left depends on, in words.
     travel: of its joint [rad].
+    shown: how many standard errors it is from nothing beside all small errors of an arm.
     """
     on = row.leader.dependence
     own = sum(one.leader.place == row.leader.place and of_curve(one) for one in beside)
@@ -119,6 +121,7 @@ def of_name(
             # What is not missed at all says more than how much others are.
             'missed': log(float(np.median(missed))),
             'least missed': log(min(missed)),
+            'shown beside others': log(shown),
             'members': len(row.listed),
             'faint beside others': faint(log(size), len(beside)),
             'others of its curve': own if of_curve(row) else 0.0,

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 from scipy.linalg.lapack import dtrtri
@@ -109,6 +110,35 @@ def allowed(
         middle=float(bool(model.found)),
     )
     return _with_usual_sigma(posterior, model, problem)
+
+
+def shown_beside_others(problem: Problem, model: Model, scale: Scale) -> tuple[float, ...]:
+    """
+    Return how many standard errors every effect found is from nothing, all other errors free.
+
+    Every arm has a little of every small error, each as large as machines have it. A zero that such
+    errors would make as well is found where few effects are looked for, and no more likely for that.
+    """
+    problem, scale = problem.thinned_with(_noisy(scale), ROWS)
+    what = _directions(problem, model)
+    prior = _prior(what, model)
+    rows = _rows(problem, model, scale, what, prior)
+    mean, covariance = Conditioning(rows, prior, prior.width, 1.0).given()
+    sizes = [effect.fit.coordinates().size for effect in what.effects]
+    of = np.repeat(np.arange(len(sizes)), sizes)
+    straight = prior.middle[what.frame_count :][: of.size] != 0.0
+    out = []
+    for effect in model.found:
+        own = [
+            k
+            for k, one in enumerate(what.effects)
+            if (one.name, one.site) == (effect.name, effect.site)
+        ]
+        index = what.frame_count + np.flatnonzero(np.isin(of, own) & straight)
+        away = (mean - prior.middle)[index]
+        square = float(away @ np.linalg.solve(covariance[np.ix_(index, index)], away))
+        out.append(float(np.sqrt(square / max(index.size, 1))) if index.size else nan)
+    return tuple(out)
 
 
 def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:

@@ -21,8 +21,8 @@ from ..arrays import Array
 from ..effects.effect import Effect
 from ..effects.plausible import beyond
 from ..effects.registry import REGISTRY
-from .algebra.definite import ROUNDING
 from .algebra.fit import Fit, without_strays
+from .algebra.negligible import ROUNDING
 from .algebra.noise_floor import NANOMETRE
 from .algebra.problem import Problem, Scale, Site
 from .algebra.workspace import Library, Role, Workspace

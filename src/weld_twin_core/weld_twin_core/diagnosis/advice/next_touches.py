@@ -29,9 +29,9 @@ from ...effects.effect import Effect
 from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
 from ...twin.features import Features
-from ..algebra.definite import FLAT, ROUNDING
 from ..algebra.fit import effect_precision, frame_prior
 from ..algebra.motions import plain_causes
+from ..algebra.negligible import FLAT, ROUNDING
 from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from .experiment import motion_entry

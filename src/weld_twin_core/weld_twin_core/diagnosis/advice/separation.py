@@ -27,8 +27,8 @@ from ...arrays import Array, spread_over
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ...twin.features import with_expected_effort
-from ..algebra.definite import REPEATED
 from ..algebra.fit import design, effect_precision, with_weights
+from ..algebra.negligible import REPEATED
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, Piece
 

@@ -23,8 +23,9 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.plausible import spreads
 from .columns import Columns, designed
-from .definite import EMPTY, FLAT, REPEATED, ROUNDING, SLIGHT, factored, unit_diagonal
+from .definite import factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
+from .negligible import EMPTY, FLAT, REPEATED, ROUNDING, SLIGHT
 from .noise_floor import NANOMETRE
 from .problem import Model, Problem, Scale
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...arrays import Array
-from .definite import SLIGHT
+from .negligible import SLIGHT
 
 Row = TypeVar('Row', bound=np.generic)
 ENOUGH = 12

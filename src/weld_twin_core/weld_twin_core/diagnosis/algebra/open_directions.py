@@ -16,9 +16,9 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from .definite import FLAT
 from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
 from .independent_rows import effective_share
+from .negligible import FLAT
 from .problem import ROWS, Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)

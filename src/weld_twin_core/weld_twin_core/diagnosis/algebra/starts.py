@@ -14,9 +14,10 @@ from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.memory import Picker
 from .columns import Maker, Piece, Rows, rows_of
-from .definite import EMPTY, FLAT, ROUNDING, outside, span_of
+from .definite import outside, span_of
 from .fit import design
 from .motions import moved_most
+from .negligible import EMPTY, FLAT, ROUNDING
 from .problem import Model, Problem, Scale
 
 MEMORY = (Stage.SERVO, Stage.PLAY)

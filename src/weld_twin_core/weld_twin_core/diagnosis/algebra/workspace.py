@@ -23,9 +23,10 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
 from .columns import Columns, designed
-from .definite import EMPTY, FLAT, REPEATED, ROUNDING, Index, unit_diagonal
+from .definite import Index, unit_diagonal
 from .fit import Fit, design, fit, predict_fit
 from .independent_rows import FEWEST, effective_share
+from .negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from .problem import Model, Problem, Scale, Site
 from .starts import started
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from ...twin.posterior import Posterior
 from ..advice import Limits, actions
-from ..algebra.definite import EMPTY
 from ..algebra.fit import trusted
 from ..algebra.motions import never_parted
+from ..algebra.negligible import EMPTY
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated

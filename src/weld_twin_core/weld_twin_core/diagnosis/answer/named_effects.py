@@ -25,9 +25,9 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance, designed
-from ..algebra.definite import EMPTY, SLIGHT
 from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
+from ..algebra.negligible import EMPTY, SLIGHT
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import profile
 from ..evidence import Search, Verdict

@@ -19,10 +19,10 @@ from ..advice.experiment import confirming, extended, next_experiment
 from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
 from ..advice.separation import Explanation
-from ..algebra.definite import FLAT
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.motions import narrow
+from ..algebra.negligible import FLAT
 from ..algebra.problem import ROWS, Scale
 from ..beliefs import CAUSES
 from ..evidence import LIKELIER, NAMED, Search, Verdict

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from ..algebra.definite import ROUNDING
+from ..algebra.negligible import ROUNDING
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, Evidence, Row, Verdict, marginal
 from ..result import NAMING, Cause, Family

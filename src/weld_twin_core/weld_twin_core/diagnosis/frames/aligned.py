@@ -23,8 +23,8 @@ from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ...errors import DataError
 from ...recording import Measurements, Recording
-from ..algebra.definite import FLAT, REWEIGHTED
 from ..algebra.fit import LEAST_NOISE, fit
+from ..algebra.negligible import FLAT, REWEIGHTED
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import NEAR, initial_frames
 

@@ -29,8 +29,8 @@ import numpy as np
 
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
-from ..algebra.definite import REWEIGHTED, ROUNDING, SLIGHT
 from ..algebra.fit import FRAME_SHIFT, LEAST_NOISE, fit, robust_scale
+from ..algebra.negligible import REWEIGHTED, ROUNDING, SLIGHT
 from ..algebra.problem import LEVER, ROWS, Model, Problem
 
 NEAR = FRAME_SHIFT

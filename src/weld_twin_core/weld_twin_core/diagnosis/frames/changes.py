@@ -23,7 +23,7 @@ from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
 from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
-from ..algebra.definite import REPEATED, REWEIGHTED, unit_diagonal
+from ..algebra.definite import unit_diagonal
 from ..algebra.fit import (
     coordinates,
     design,
@@ -37,6 +37,7 @@ from ..algebra.fit import (
 )
 from ..algebra.independent_rows import effective_share
 from ..algebra.motions import constant, of_no_size
+from ..algebra.negligible import REPEATED, REWEIGHTED
 from ..algebra.problem import ROWS, Change, Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..evidence import Search

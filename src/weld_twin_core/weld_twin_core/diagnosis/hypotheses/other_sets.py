@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import REPEATED, outside, span_of
+from ..algebra.definite import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
+from ..algebra.negligible import REPEATED
 from ..algebra.workspace import (
     Choice,
     Library,

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import EMPTY
+from ..algebra.negligible import EMPTY
 from ..beliefs import Beliefs
 from ..evidence import Row, Search, Verdict, marginal
 from ..result import Cause, Contributions, Shares, Site

@@ -13,8 +13,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import EMPTY, FLAT, factored
+from ..algebra.definite import factored
 from ..algebra.fit import Fit
+from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.problem import Problem, Scale
 from ..beliefs import CAUSES, SHORTLIST, Beliefs
 from ..evidence import LIKELIER, NAMED, marginal

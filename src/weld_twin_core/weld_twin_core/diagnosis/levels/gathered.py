@@ -32,8 +32,8 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ...recording import Recording
 from ...twin.features import Features
-from ..algebra.definite import EMPTY, FLAT
 from ..algebra.independent_rows import ENOUGH, measured_axes
+from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.noise_floor import THIRD, NoiseFloor
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Scatter, Search

@@ -20,7 +20,7 @@ from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
 from ..algebra.columns import MANY
-from ..algebra.definite import EMPTY, ROUNDING
+from ..algebra.negligible import EMPTY, ROUNDING
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..evidence import Search

@@ -25,7 +25,7 @@ from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage
 from ...twin.features import Features, joints_of
 from ..algebra.columns import Maker, Piece, designed
-from ..algebra.definite import FLAT, HIDDEN, outside, share_outside, span_of
+from ..algebra.definite import outside, share_outside, span_of
 from ..algebra.fit import (
     Fit,
     coordinates,
@@ -39,6 +39,7 @@ from ..algebra.fit import (
 from ..algebra.independent_rows import FEWEST
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.motions import candidate_kinds, hardly_moves, lacking, moved_most, separable_orders
+from ..algebra.negligible import FLAT, HIDDEN
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.unseen_stretches import Unseen

@@ -37,9 +37,10 @@ from ...twin.features import shown
 from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
-from ..algebra.definite import EMPTY, FLAT, inverse_of, root_of
+from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, PROBE, Fit
 from ..algebra.independent_rows import effective_share
+from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.noise_floor import MICROMETRE, NoiseFloor
 from ..algebra.open_directions import AXES, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale

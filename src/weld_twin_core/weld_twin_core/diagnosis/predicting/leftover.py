@@ -22,9 +22,10 @@ from scipy.special import chdtri
 
 from ...arrays import Array, spread_over
 from ...twin.reversals import just_turned
-from ..algebra.definite import EMPTY, REPEATED, unit_diagonal
+from ..algebra.definite import unit_diagonal
 from ..algebra.fit import trusted
 from ..algebra.independent_rows import ENOUGH
+from ..algebra.negligible import EMPTY, REPEATED
 from ..algebra.noise_floor import NANOMETRE, NoiseFloor
 from ..algebra.problem import Problem
 from ..unseen.folds import COVERED

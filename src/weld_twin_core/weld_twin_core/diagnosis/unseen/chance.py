@@ -22,7 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.definite import EMPTY, FLAT, REPEATED, Index, unit_diagonal
+from ..algebra.definite import Index, unit_diagonal
+from ..algebra.negligible import EMPTY, FLAT, REPEATED
 from ..algebra.noise_floor import spread_of
 
 DRAWS = 100

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ...arrays import Array
-from ..algebra.definite import EMPTY
+from ..algebra.negligible import EMPTY
 from ..algebra.noise_floor import NANOMETRE
 from ..algebra.problem import PLACES, Problem
 

@@ -27,8 +27,8 @@ from ...effects.curves import QUANTITIES, FrameCurve, JointCurve, basis
 from ...effects.effect import Effect
 from ...twin.features import Features
 from ...twin.memory import Picker
-from ..algebra.definite import FLAT, ROUNDING
 from ..algebra.independent_rows import ENOUGH
+from ..algebra.negligible import FLAT, ROUNDING
 from ..algebra.problem import Model, Problem, Scale
 from .folds import STRETCHES
 

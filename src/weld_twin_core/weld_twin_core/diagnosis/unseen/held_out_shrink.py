@@ -13,9 +13,9 @@ import numpy as np
 from ...arrays import Array
 from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
-from ..algebra.definite import EMPTY
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.independent_rows import FEWEST
+from ..algebra.negligible import EMPTY
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import CAUSES, Beliefs
 from ..evidence import Search

@@ -13,8 +13,8 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ..algebra.definite import EMPTY, ROUNDING
 from ..algebra.fit import Fit, trusted
+from ..algebra.negligible import EMPTY, ROUNDING
 from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs

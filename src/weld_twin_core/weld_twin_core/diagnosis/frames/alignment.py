@@ -31,8 +31,11 @@ from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
 from ..algebra.fit import FRAME_SHIFT, LEAST_NOISE, fit, robust_scale
 from ..algebra.negligible import REWEIGHTED, ROUNDING, SLIGHT
-from ..algebra.problem import LEVER, ROWS, Model, Problem
+from ..algebra.problem import ROWS, Model, Problem
 
+LEVER = 0.1
+"""Metres that a radian counts as here. Turns may be told in another convention, and then positions have
+to find the frames: with half a metre quaternions that were read the wrong way round turned the base."""
 NEAR = FRAME_SHIFT
 """Median gap [m] from which a least-squares fit finds its own way."""
 STEPS = 3

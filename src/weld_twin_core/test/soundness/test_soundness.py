@@ -10,6 +10,7 @@ from measured_cells import anywhere, asked, moving, recorded, rejointed, remeasu
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.known_arms import fingerprint
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
@@ -183,3 +184,21 @@ def test_a_slip_stays_with_the_robot_and_a_knock_with_its_set_up(ur5):
     left = of_the_robot(effects_from_list(entries, ur5))
     assert [type(effect) for effect in left] == [JointOffset]
     assert left[0].offset == 1.5e-3
+
+
+def test_reflectors_at_other_places_of_the_flange_are_tools_of_their_own(ur5, rng):
+    base, places = anywhere(rng, 2.0), ([0.1, 0.0, 0.03], [0.0, 0.11, 0.03], [0.0, -0.11, 0.03])
+    recordings = [
+        recorded(
+            ur5.with_frames(base=base, tool=transform(np.eye(3), np.array(place))),
+            stations(ur5, rng, count=16),
+            rng,
+            points=True,
+            name=f'reflector {k + 1}',
+        )
+        for k, place in enumerate(places)
+    ]
+    (found,) = looked_at(ur5, *recordings).unsound
+    assert found.kind == 'reflector_jumped'
+    given = Given(tuple(recordings), ur5, frozenset({'base', 'tool'}), ('tool_pose',))
+    assert not examine(given).unsound

@@ -380,7 +380,9 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     off = np.concatenate([off, *beside])
     spread = [spreads(model.robot, change.effect) for change in model.changes]
     now = [change.effect.fit.coordinates() for change in model.changes]
-    own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)
+    # What differs by more than machines bend is another tool or base, and may be anywhere.
+    wide = [np.maximum(one, np.abs(far)) for one, far in zip(spread, now, strict=True)]
+    own = np.concatenate([np.zeros(0), *wide]) ** -2.0 if wide else np.zeros(0)
     return np.concatenate([precision, own]), np.concatenate([off, *now])
 
 

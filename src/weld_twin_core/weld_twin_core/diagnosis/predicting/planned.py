@@ -91,7 +91,7 @@ def plan_stations(
     Raises DataError: a number means nothing, or hardly any posture of the region is clear of the
     floor.
     """
-    if not (0.0 < tolerance < 1.0 and 0.0 < noise < 1.0 and count >= 1 and 0.0 < spread <= np.pi):
+    if not (0.0 < tolerance < 1.0 and 0.0 < noise < 0.1 and count >= 1 and 0.0 < spread <= np.pi):
         raise DataError('a plan needs stations, a tolerance, a noise and a spread above zero')
     clear = clear_postures(robot, spread)
     if len(clear) < JUDGED + min(count, CANDIDATES):
@@ -134,7 +134,7 @@ def plan_more(
     region: postures at which it is judged how sure the model is, and those that may be measured.
     """
     offered = len(region[1])
-    if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 1.0 and 0 <= count <= offered):
+    if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= offered):
         raise DataError(
             f'a plan in a region needs a tolerance and a noise above zero, and at most the '
             f'{offered} stations that there are'

@@ -114,23 +114,31 @@ def stairs_of(problem, model, scale):
     return min(fits, key=lambda one: one.rss)
 
 
-@pytest.mark.parametrize('seed', range(3))
-def test_a_staircase_that_stations_chose_says_nothing_of_those_that_did_not(seed):
-    """Another axis leaks into the elbow; of thousands of staircases one looks like that."""
+def leaked_into_the_elbow(seed):
+    """Return stations of an arm whose elbow another axis leaks into, a model, and the noise."""
     problem, model = tiny((), seed, noise=1e-6)
-    (recording,), scale = problem.recordings, known_scale(problem)
+    (recording,) = problem.recordings
     q = recording.joints.q.copy()
     q[:, 2] += 3e-4 * np.sin(5.0 * q[:, 5] + 3.3)
     leaked = Recording('leak', JointMotion(recording.joints.t, q, static=True))
     poses = Twin(model.robot).poses(leaked, recording.measured.t)
     seen = Measurements(recording.measured.t, poses.position, poses.rotation)
-    problem = replace(problem, recordings=(recording.with_measured(seen),))
-    found = stairs_of(problem, model, scale)
-    unseen = Unseen.of(problem, scale, found, np.zeros(0))
-    assert unseen.rms(found.residual) < 0.95 * unseen.rms(unseen.bare)
-    assert unseen.rms(unseen.whole) > 0.98 * unseen.rms(unseen.bare)
-    assert unseen.wandered()[0] > 100.0
-    assert unseen.missed().min() < 0.0, 'some part is predicted better without it'
+    scale = known_scale(problem)
+    return replace(problem, recordings=(recording.with_measured(seen),)), model, scale
+
+
+def test_a_staircase_that_stations_chose_says_nothing_of_those_that_did_not():
+    """Of thousands of staircases one looks like what another axis leaks into the elbow."""
+    ratios = []
+    for seed in range(8):
+        problem, model, scale = leaked_into_the_elbow(seed)
+        found = stairs_of(problem, model, scale)
+        unseen = Unseen.of(problem, scale, found, np.zeros(0))
+        assert unseen.rms(found.residual) < 0.95 * unseen.rms(unseen.bare)
+        ratios.append(unseen.rms(unseen.whole) / unseen.rms(unseen.bare))
+        assert unseen.wandered()[0] > 100.0
+        assert unseen.missed().min() < 0.0, 'some part is predicted better without it'
+    assert np.mean(ratios) > 1.0, 'what nobody chose it on is predicted no better with it'
 
 
 @pytest.mark.parametrize('static', [True, False])

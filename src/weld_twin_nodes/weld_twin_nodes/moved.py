@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-_WORDING = ('mending', 'quantities', 'switches', 'verdict', 'words')
+_WORDING = ('mending', 'quantities', 'verdict', 'words')
 _ROOMS = ('demo', 'fleet', 'guarded', 'history', 'report', 'sensitivity_report', 'serve')
 _INTO = {
     'report': 'family_table answer cause_cards cause_list curve_plot charts root_frame controllers '
@@ -24,6 +24,7 @@ _INTO = {
 _PAIRS = {room: iter(names.split()) for room, names in _INTO.items()}
 MOVED = {
     'weld_twin_nodes.report.leading': 'weld_twin_nodes.wording.verdict',
+    'weld_twin_nodes.report.switches': 'weld_twin_nodes.wording.mending',
     **{
         f'weld_twin_nodes.{room}.{old}': f'weld_twin_report.{room}.{new}'
         for room, names in _PAIRS.items()

@@ -209,9 +209,7 @@ def _conclude(
     weighed = weighed_families(result, unseen, beliefs) if result.dense else None
     families = None if weighed is None else weighed.families
     evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs, with_strays)
-    if not result.dense:
-        shown = shown_beside_others(result.problem, result.final.model, result.scale)
-        evidence = replace(evidence, shown=shown)
+    evidence = replace(evidence, shown=_shown(result))
     table = tuple(Row.of(candidate_set, beliefs) for candidate_set in result.candidate_sets)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
@@ -225,13 +223,19 @@ def _conclude(
     result, unseen, shrink, verdict = choose_model(result, unseen, shrink, *which)
     result = _alone(_near_given_frames(result, examined.given.robot), shrink)
     fitted = (result.final.model, result.scale, result.precision)
-    nameless = verdict.status == 'unknown'
-    posterior = allowed(result.problem, *fitted, floor, nameless=nameless)
+    posterior = allowed(result.problem, *fitted, floor, nameless=verdict.status == 'unknown')
     if result.final.model.found:
         shrink = elsewhere(shrink, posterior)
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
+
+
+def _shown(result: Search) -> tuple[float, ...]:
+    """Return how sure each of a few effects is beside all small errors of an arm."""
+    if result.dense:
+        return ()
+    return shown_beside_others(result.problem, result.final.model, result.scale)
 
 
 def _decided(

@@ -42,7 +42,7 @@ them together moves the tool by a micrometre."""
 BELIEF = np.array([0.1, 0.1, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
 """How often each size comes before anything is known of this arm. A judgement: real arms have a third
 of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
-TRUST = 4.0
+POOLED, OWN = 3.0, 4.0
 """So many coordinates' worth of belief in that, and in what all families together show, for each."""
 USUAL = SIZES[5]
 """Size, a third of what machines have, from which on an error is one that machines usually have."""
@@ -315,10 +315,10 @@ class _Chain:
         counts = np.zeros(self.belief.shape)
         chosen = np.searchsorted(SIZES, self.size[self.counted])
         np.add.at(counts, (group[self.counted], chosen), 1.0)
-        alike = counts[group[self.hidden]] + TRUST * BELIEF
+        alike = counts[group[self.hidden]] + OWN * BELIEF
         self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
         for part in (gears, ~gears):
-            common = counts[part].sum(axis=0) + TRUST * BELIEF
-            drawn = self.rng.standard_gamma(counts[part] + TRUST * common / common.sum())
+            common = counts[part].sum(axis=0) + POOLED * BELIEF
+            drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
             drawn = np.maximum(drawn, EMPTY)
             self.belief[part] = drawn / drawn.sum(axis=1, keepdims=True)

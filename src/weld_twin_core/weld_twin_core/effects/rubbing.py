@@ -163,7 +163,7 @@ class Friction(MemoryEffect):
     def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
         """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""
         q = self._theta(view)
-        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        travel = self.number('travel')[..., None]
         samples = np.broadcast_shapes(q.shape[:-1], travel.shape[:-2])
         start = (view.t[0], q[..., 0], np.zeros((*samples, 2)))
         t0, before, z0 = start if state is None else state
@@ -178,7 +178,7 @@ class Friction(MemoryEffect):
         if not self._recovers:
             return bent
         last, left = before
-        rate = np.asarray(self.recovery, dtype=np.float64)[..., None, None]
+        rate = self.number('recovery')[..., None]
         kept = np.exp(-rate * self.release * lost)
         step = np.diff(bent, axis=-1, prepend=np.broadcast_to(last, bent.shape[:-1])[..., None])
         return linear(kept, kept * step, np.broadcast_to(left, bent.shape[:-1]))
@@ -201,12 +201,12 @@ class Friction(MemoryEffect):
         if view.static:
             return [self._moves(view, np.zeros_like(self._theta(view)))] * 4
         z, both, lost, _ = self._bent(view, None)
-        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        travel = self.number('travel')[..., None]
         slope = bristle_tangent(both, travel, lost, z, -np.abs(both) / travel**2)
         left, slope = self._left(z, lost), self._left(slope, lost)
         # What is left falls by itself in every step of time: the same recursion, driven by it.
         step = self.release * lost
-        rate = np.asarray(self.recovery, dtype=np.float64)[..., None, None]
+        rate = self.number('recovery')[..., None]
         fallen = linear(np.exp(-rate * step), -step * left, np.zeros(left.shape[:-1]))
         windup = self.number('windup')
         parts = (left, windup * slope, windup * fallen)
@@ -218,7 +218,7 @@ class Friction(MemoryEffect):
         if view.static:
             return tangent
         z, both, lost, _ = self._bent(view, None)
-        travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
+        travel = self.number('travel')[..., None]
         own = np.diff(tangent, axis=-1, prepend=tangent[..., :1])[..., None, :]
         change = np.where(both[..., :1, :] < 0.0, -own, own) / travel
         slope = self._left(bristle_tangent(both, travel, lost, z, change), lost)

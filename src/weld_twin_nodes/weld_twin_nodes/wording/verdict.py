@@ -21,6 +21,7 @@ from .words import (
     kinds_doubted,
     likely,
     listed,
+    named_causes,
     not_to_be_tried,
     open_sets,
     open_sites,
@@ -109,10 +110,10 @@ def _families(diagnosis: Diagnosis) -> str:
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
     if kinds_doubted(diagnosis):
-        kinds = [one for one in diagnosis.causes if one.name and not one.rest]
         first = (
             f'The {size} is explained best by many small errors together; these data do not tell'
         )
+        kinds = named_causes(diagnosis)
         likeliest = max(kinds, key=lambda one: one.probability, default=None)
         if likeliest is None:
             return f'{first} which.', _gain(diagnosis)

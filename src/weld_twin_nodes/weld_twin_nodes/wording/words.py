@@ -225,10 +225,15 @@ def same_words(diagnosis: Diagnosis, *sites: Site) -> list[str]:
     return out
 
 
+def named_causes(diagnosis: Diagnosis) -> list[Cause]:
+    """Return the causes that have a name."""
+    return [one for one in diagnosis.causes if one.name and not one.rest]
+
+
 def kinds_doubted(diagnosis: Diagnosis) -> bool:
     """Return whether each kind of many small errors is likelier wrong than right by itself."""
-    kinds = [one for one in diagnosis.causes if one.name and not one.rest]
-    return bool(diagnosis.families) and all(one.probability <= LIKELIER for one in kinds)
+    told = [one.probability > LIKELIER for one in named_causes(diagnosis)]
+    return bool(diagnosis.families) and not any(told)
 
 
 def open_sites(diagnosis: Diagnosis) -> set[Site]:

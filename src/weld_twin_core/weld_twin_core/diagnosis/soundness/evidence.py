@@ -78,7 +78,7 @@ class Case:
 
     @cached_property
     def swept(self) -> tuple[NDArray[np.bool_], ...]:
-        return swept([r.joints.at(r.seen.t)[0] for r in self.recordings])
+        return swept(self._motions([None] * len(self.recordings)))
 
     @cached_property
     def tool_fixed(self) -> bool:

@@ -51,6 +51,11 @@ def length(value: float) -> str:
     return f'{millimetres:.3g} mm' if millimetres > 0.0 else 'less than 0.001 mm'
 
 
+def capital(words: str) -> str:
+    """Return words as a sentence begins with them."""
+    return f'{words[0].upper()}{words[1:]}'
+
+
 def falls(before: float, after: float) -> str:
     return f'the gap falls from {length(before)} to {length(after)}'
 

@@ -30,7 +30,7 @@ from ...effects.geometry import (
 )
 from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
-from .lengths import falls, length, listed
+from .lengths import capital, falls, length, listed
 from .limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .mending import frames_fitted
 from .snapshot import LENGTHS, Arm, Snapshot, of_joints, rough_models
@@ -75,7 +75,7 @@ class _Tried(NamedTuple):
 def _finding(tried: _Tried, shot: Snapshot, after: float) -> Finding:
     """Return the mistake that a suspicion is, with the gap [m] before and after it is undone."""
     one, others = tried.suspicion, tried.alike
-    words = f'{one.sentence[0].upper()}{one.sentence[1:]}'
+    words = capital(one.sentence)
     if after < shot.remaining:
         words += f'; undone, {falls(shot.remaining, after)}'
     if others:

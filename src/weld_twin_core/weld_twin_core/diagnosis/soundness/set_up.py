@@ -22,7 +22,7 @@ from ...effects.dated import InstrumentKnock
 from ...effects.geometry import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
-from .lengths import falls, length, listed, middle_of_each
+from .lengths import capital, falls, length, listed, middle_of_each
 from .limits import CLEAR, FEW, HALVED, NOISE, PARTED, TILTED, WRONG
 from .mending import differing
 from .slips import TAKEN_UP, Settling, Slip
@@ -157,7 +157,7 @@ def orientation(case: Case) -> Sequence[Finding]:
         assert suspicion.mend is not None
         trial = shot.mended(suspicion.mend)
         if CLEAR * disagreement(trial, trial.framed) < turned:
-            words = f'{suspicion.sentence[0].upper()}{suspicion.sentence[1:]}'
+            words = capital(suspicion.sentence)
             sentence = f'{words}; undone, orientations agree with the joints.'
             return (suspicion._replace(sentence=sentence),)
     return (

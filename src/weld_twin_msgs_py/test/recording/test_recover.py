@@ -6,6 +6,8 @@ import json
 import multiprocessing
 import os
 import resource
+import shlex
+import shutil
 import signal
 import sqlite3
 import time
@@ -247,6 +249,23 @@ def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
     found = numbers(tmp_path / 'bag')
     assert len(found) >= flushed > 0
     assert found == list(range(len(found)))
+
+
+def test_what_happens_to_a_recording_from_outside_is_told_and_the_command_works(
+    tmp_path, storage, numbered
+):
+    bags = [GrowingBag(tmp_path / name, storage=storage).open() for name in ('gone', 'taken')]
+    for bag in bags:
+        bag.write_cdr(*numbered(1))
+    shutil.rmtree(bags[0].folder)
+    with pytest.raises(DataError, match=r'was removed while it was written$'):
+        bags[0].flush()
+    bags[1].path.mkdir()
+    with pytest.raises(DataError, match='appeared meanwhile; what was recorded') as told:
+        bags[1].close()
+    command = shlex.split(str(told.value).partition("kept: '")[2].rstrip("'"))
+    assert command[3] == str(bags[1].folder)
+    assert recover(command[3], command[5]).messages == {'/joint_states': 1}
 
 
 def test_another_tool_reads_the_recovered_bag(cut_short, storage):

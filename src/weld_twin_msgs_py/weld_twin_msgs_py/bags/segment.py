@@ -116,7 +116,11 @@ class Segment:
 
     @property
     def file(self) -> Path:
-        return next(file for file in self.folder.iterdir() if file.suffix in SUFFIXES)
+        files = list(self.folder.iterdir()) if self.folder.is_dir() else []
+        for file in files:
+            if file.suffix in SUFFIXES:
+                return file
+        raise FileNotFoundError(0, f"'{self.folder}' was removed while it was written")
 
     def announce(self, channel: Channel) -> Connection:
         """Return the connection of a channel, made when it is new."""
@@ -145,9 +149,9 @@ class Segment:
         storage: Any = self._writer.storage
         if hasattr(storage, 'bio'):
             storage.bio.flush()
-            os.fsync(storage.bio.fileno())
         else:
             storage.conn.commit()
+        sync(self.file)  # by its name: a file that was removed is written on without an error
         self._unflushed = False
 
     def close(self, custom: dict[str, str]) -> None:
@@ -331,14 +335,18 @@ SPARE = 10_000_000
 
 
 def recover_command(path: Path, growing: Path | None = None) -> str:
-    """Return ``weld-twin bag recover`` for a recording, from where it grew if that has no room."""
-    command = ['weld-twin', 'bag', 'recover', str(path)]
-    needed = _size(path if growing is None else growing) + SPARE
-    if not _has_room(path.parent, needed):
-        places = (Path.cwd(), Path.home(), Path(tempfile.gettempdir()))
-        result = next((place for place in places if _has_room(place, needed)), None)
-        command += ['--out', str((result or Path('ANOTHER_DISK')) / path.name)]
-    return shlex.join(command)
+    """
+    Return ``weld-twin bag recover`` for a recording, and where to if it can't be where it was meant.
+
+    growing: where it grew; there may be no room beside it, or something else of its name by now.
+    """
+    source = path if growing is None or not path.exists() else growing
+    name = path.name if source == path else f'{path.name}_recovered'
+    needed = _size(growing or path) + SPARE
+    places = (path.parent, Path.cwd(), Path.home(), Path(tempfile.gettempdir()))
+    place = next((place for place in places if _has_room(place, needed)), Path('ANOTHER_DISK'))
+    command = ['weld-twin', 'bag', 'recover', str(source)]
+    return shlex.join(command if place / name == path else [*command, '--out', str(place / name)])
 
 
 def _has_room(folder: Path, needed: int) -> bool:

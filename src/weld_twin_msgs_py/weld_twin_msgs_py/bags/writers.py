@@ -30,6 +30,7 @@ from ..messages.from_messages import stamp_ns
 from ..messages.typestore import PROVENANCE_PREFIX, TYPES
 from .segment import (
     METADATA,
+    SUFFIXES,
     Channel,
     Segment,
     Segments,
@@ -277,12 +278,14 @@ class GrowingBag:
             )
 
     def _clear_errors(self) -> Any:
-        return clear_write_errors(
-            self.path,
-            lambda: (
-                '; what was recorded until then is kept: '
-                f"'{recover_command(self.path, self.folder)}'"
-            ),
+        return clear_write_errors(self.path, self._kept)
+
+    def _kept(self) -> str:
+        """Return what can be had of it still."""
+        if not any(file.suffix in SUFFIXES for file in self.folder.rglob('*')):
+            return ''
+        return (
+            f"; what was recorded until then is kept: '{recover_command(self.path, self.folder)}'"
         )
 
 

@@ -51,6 +51,12 @@ def _indices(present: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[int, ..
     if missing:
         listed = ', '.join(present) or 'none'
         raise DataError(f'the joint state has no joint {missing[0]!r}; it has {listed}')
+    twice = [name for name in wanted if present.count(name) > 1]
+    if twice:
+        raise DataError(
+            f'the joint state names joint {twice[0]!r} twice, and which position counts is not told; '
+            'have the driver name each joint once'
+        )
     return tuple(present.index(name) for name in wanted)
 
 

@@ -32,6 +32,10 @@ def too_few_positions(m):
     m.position = m.position[:4]
 
 
+def named_twice(m):
+    m.name, m.position = [*m.name, 'elbow_joint'], [*m.position, 0.0]
+
+
 def no_stamp(m):
     m.header.stamp.sec = m.header.stamp.nanosec = 0
 
@@ -50,6 +54,7 @@ def value(k, number, field='position'):
 BAD_JOINT_STATES = {
     'missing joint': (missing_joint, "no joint 'wrist_3_joint'"),
     'too few positions': (too_few_positions, '6 names but 4 positions'),
+    'a joint named twice': (named_twice, "names joint 'elbow_joint' twice"),
     'not a number': (value(2, NAN), "'elbow_joint' has the position nan"),
     'infinite velocity': (value(1, INF, 'velocity'), 'the velocity inf'),
     'degrees': (value(1, -90.0), 'this looks like degrees in a radian field'),

@@ -19,7 +19,6 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import BagReader, provenance, read_recording, write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf
-from weld_twin_nodes.cli import main
 from weld_twin_nodes.cli.in_process import weld_twin
 
 WIDTH, OFFSET, DELAY = 1.0e-3, 1.5e-3, 0.012
@@ -35,10 +34,6 @@ FILES = {
 }
 
 
-def run(*words):
-    return main([str(word) for word in words])
-
-
 @pytest.fixture(scope='module')
 def cell(tmp_path_factory):
     """Two runs along a seam of an arm with play in its elbow."""
@@ -48,11 +43,9 @@ def cell(tmp_path_factory):
         '- {effect: measurement_noise, sigma: 2.0e-5}\n'
     )
     for name, path, seed in (('first', 'line', 4), ('second', 'arc', 2)):
-        code = run(
-            *('simulate', '--robot', 'ur5', '--effects', folder / 'true.yaml', '--path', path),
-            *('--profile', 'aggressive', '--rate', 60, '--seed', seed, '--out', folder / name),
-        )
-        assert code == 0
+        words = ('simulate', '--robot', 'ur5', '--effects', folder / 'true.yaml', '--path', path)
+        words += ('--profile', 'aggressive', '--rate', 60, '--seed', seed)
+        done(*words, '--out', folder / name)
     return folder
 
 
@@ -86,14 +79,19 @@ def test_all_files_are_there_and_nothing_else(found):
     assert not [path for path in found.parent.iterdir() if path.name.startswith('.')]
 
 
+def digest_of(bag):
+    files = sorted(bag.iterdir())
+    return hashlib.sha256(
+        b''.join(f.name.encode() + b'\0' + f.read_bytes() for f in files)
+    ).hexdigest()
+
+
 def test_inputs_are_told_with_their_hashes(cell, found):
     inputs = json.loads((found / 'diagnosis.json').read_text())['inputs']
-    digest = hashlib.sha256()
-    for file in sorted((cell / 'first').iterdir()):
-        digest.update(file.name.encode() + b'\0' + file.read_bytes())
+    digest = digest_of(cell / 'first')
     assert [item['use'] for item in inputs] == ['recording', 'held out']
-    assert inputs[0]['sha256'] == digest.hexdigest()
-    assert digest.hexdigest() in (found / 'report.html').read_text()
+    assert inputs[0]['sha256'] == digest
+    assert digest in (found / 'report.html').read_text()
 
 
 def test_the_verdict_is_printed(said, found):
@@ -103,21 +101,15 @@ def test_the_verdict_is_printed(said, found):
 
 
 def test_what_is_known_is_in_the_twin_from_the_start_and_what_is_excluded_never_is(cell, tmp_path):
-    run(
-        *('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml'),
-        *('--exclude-effect', 'servo_lag', '--out', tmp_path / 'rest'),
-    )
+    words = ('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml')
+    done(*words, '--exclude-effect', 'servo_lag', '--out', tmp_path / 'rest')
     data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
     assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
-    assert data['model']['known'][0] == {
-        'effect': 'backlash',
-        'joint': 'elbow_joint',
-        'width': WIDTH,
-    }
+    play = {'effect': 'backlash', 'joint': 'elbow_joint', 'width': WIDTH}
+    assert data['model']['known'][0] == play
     named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}
-    assert (
-        'servo_lag' not in named and data['not_considered']['servo_lag'] == 'excluded by the user'
-    )
+    assert 'servo_lag' not in named
+    assert data['not_considered']['servo_lag'] == 'excluded by the user'
 
 
 @pytest.mark.parametrize(
@@ -138,45 +130,43 @@ def test_wrong_use_is_one_line_and_leaves_nothing(cell, tmp_path, words, reason)
 
 def twin_poses(bag):
     with BagReader(bag) as reader:
-        rows = [
-            (
-                m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
-                m.message.pose.position,
-            )
-            for m in reader.messages(['/twin/tool_pose'])
-        ]
-    return np.array([ns for ns, _ in rows]), np.array([[p.x, p.y, p.z] for _, p in rows])
+        told = [m.message for m in reader.messages(['/twin/tool_pose'])]
+    return stamps(told), points(m.pose.position for m in told)
 
 
-def test_predict_adds_what_was_found_at_every_joint_state(cell, found, tmp_path):
-    model = found / 'diagnosis.json'
-    out = tmp_path / 'predicted'
-    done('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out)
-    ns, position = twin_poses(out)
+def stamps(told):
+    return np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in told])
+
+
+def points(places):
+    return np.array([[p.x, p.y, p.z] for p in places])
+
+
+@pytest.fixture(scope='module')
+def predicted(cell, found):
+    """The other run with what was found, and its table."""
+    out = cell / 'predicted'
+    words = ('--robot', 'ur5', '--model', found / 'diagnosis.json', '--table', cell / 'poses.csv')
+    assert 'within' in done('simulate', cell / 'second', *words, '--out', out)
+    return out
+
+
+def test_predict_adds_what_was_found_at_every_joint_state(cell, found, predicted):
+    ns, position = twin_poses(predicted)
     recording = read_recording(cell / 'second', load('ur5'))
     assert np.array_equal(ns - recording.epoch_ns, np.round(recording.joints.t * 1e9))
-    twin = load_model(load('ur5'), model)
+    twin = load_model(load('ur5'), found / 'diagnosis.json')
     wanted = twin.poses(recording, recording.joints.t).position
     assert np.abs(position - wanted).max() < 1e-12
-    left = read_recording(out, load('ur5')).measured.position - wanted
+    left = read_recording(predicted, load('ur5')).measured.position - wanted
     assert np.sqrt((left**2).sum(axis=1).mean()) < 5e-5
 
 
-def write_model(path, robot, effects, bases, tool=None, inputs=()):
-    path.write_text(
-        json.dumps(
-            {
-                'schema': 'weld_twin/diagnosis/1',
-                'inputs': list(inputs),
-                'model': {
-                    'tool': (robot.T_flange_tool if tool is None else tool).tolist(),
-                    'bases': [base.tolist() for base in bases],
-                    'known': [],
-                    'found': effects,
-                },
-            }
-        )
-    )
+def write_model(path, effects, bases, tool=None, inputs=()):
+    tool = (load('ur5').T_flange_tool if tool is None else tool).tolist()
+    model = {'tool': tool, 'bases': [base.tolist() for base in bases], 'found': effects}
+    content = {'schema': 'weld_twin/diagnosis/1', 'inputs': list(inputs), 'model': model}
+    path.write_text(json.dumps(content))
     return path
 
 
@@ -185,9 +175,8 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
     robot = load('ur5')
     base, tool = np.eye(4), np.eye(4)
     base[:3, 3], tool[:3, 3] = [0.5, -0.2, 1.0], [0.0, 0.01, 0.15]
-    model = write_model(
-        tmp_path / 'm.json', robot, [{'effect': 'time_delay', 'delay': DELAY}], [base], tool
-    )
+    late = [{'effect': 'time_delay', 'delay': DELAY}]
+    model = write_model(tmp_path / 'm.json', late, [base], tool)
     out = tmp_path / 'p'
     done('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out)
     _, position = twin_poses(out)
@@ -195,23 +184,19 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
     nominal = Twin(robot.with_frames(tool=tool))
     late = nominal.poses(Recording('r', motion), motion.t - DELAY).position + base[:3, 3]
     assert np.abs(position - late).max() < 1e-12
-    assert (
-        np.abs(position - nominal.poses(Recording('r', motion)).position - base[:3, 3]).max()
-        > 1e-4
-    )
+    now = nominal.poses(Recording('r', motion)).position + base[:3, 3]
+    assert np.abs(position - now).max() > 1e-4
 
 
 def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path):
     bases = [np.eye(4), np.eye(4)]
     bases[1][0, 3] = 1.0
-    hashes = []
-    for name in ('first', 'second'):
-        digest = hashlib.sha256()
-        for file in sorted((cell / name).iterdir()):
-            digest.update(file.name.encode() + b'\0' + file.read_bytes())
-        hashes.append({'use': 'recording', 'path': name, 'sha256': digest.hexdigest()})
-    own = write_model(tmp_path / 'own.json', load('ur5'), [], bases, inputs=hashes)
-    other = write_model(tmp_path / 'other.json', load('ur5'), [], bases, inputs=hashes[:1])
+    hashes = [
+        {'use': 'recording', 'path': name, 'sha256': digest_of(cell / name)}
+        for name in ('first', 'second')
+    ]
+    own = write_model(tmp_path / 'own.json', [], bases, inputs=hashes)
+    other = write_model(tmp_path / 'other.json', [], bases, inputs=hashes[:1])
     predict = ('simulate', cell / 'second', '--robot', 'ur5')
     done(*predict, '--model', own, '--out', tmp_path / 'a')
     assert '--setup 1 to 2' in refused(*predict, '--model', other, '--out', tmp_path / 'b')
@@ -220,51 +205,33 @@ def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path):
     assert apart == pytest.approx(np.tile([1.0, 0.0, 0.0], (len(apart), 1)))
 
 
-@pytest.fixture
-def offset_model(tmp_path):
+def test_exports_carry_the_correction_and_leave_the_rest_as_effects(tmp_path):
     effects = [
         {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET},
         {'effect': 'backlash', 'joint': 'wrist_1_joint', 'width': WIDTH},
     ]
-    return write_model(tmp_path / 'm.json', load('ur5'), effects, [np.eye(4)])
-
-
-def test_exports_carry_the_correction_and_leave_the_rest_as_effects(offset_model, tmp_path):
-    for form, name in (
-        ('yaml', 'r.yaml'),
-        ('urdf', 'r.urdf'),
-        ('offsets', 'o.csv'),
-        ('left-over', 'l.yaml'),
-        ('effects', 'e.yaml'),
-    ):
-        done(
-            *('export', offset_model, '--robot', 'ur5', '--format', form),
-            *('--out', tmp_path / name),
-        )
+    words = ('export', write_model(tmp_path / 'm.json', effects, [np.eye(4)]), '--robot', 'ur5')
+    forms = {'r.yaml': 'yaml', 'r.urdf': 'urdf', 'o.csv': 'offsets', 'l.yaml': 'left-over'}
+    for name, form in {**forms, 'e.yaml': 'effects'}.items():
+        done(*words, '--format', form, '--out', tmp_path / name)
     q = np.array([[0.1, -1.0, 1.2, 0.3, -0.5, 0.2]])
     shifted = q + OFFSET * np.eye(6)[2]
-    wanted = Twin(load('ur5')).poses(Recording('r', _at(shifted))).position
+
+    def places(robot, q):
+        return Twin(robot).poses(Recording('r', JointMotion(np.zeros(1), q))).position
+
+    wanted = places(load('ur5'), shifted)
     for robot in (read_robot_yaml(tmp_path / 'r.yaml'), read_urdf(tmp_path / 'r.urdf')):
-        assert np.allclose(Twin(robot).poses(Recording('r', _at(q))).position, wanted, atol=1e-9)
+        assert np.allclose(places(robot, q), wanted, atol=1e-9)
     rows = {row['joint']: row for row in csv.DictReader((tmp_path / 'o.csv').open())}
     assert float(rows['elbow_joint']['offset']) == OFFSET and rows['elbow_joint']['unit'] == 'rad'
     assert [e['effect'] for e in yaml.safe_load((tmp_path / 'l.yaml').read_text())] == ['backlash']
     assert len(yaml.safe_load((tmp_path / 'e.yaml').read_text())) == 2
 
 
-def _at(q):
-    from weld_twin_core.recording import JointMotion
-
-    return JointMotion(np.zeros(1), q)
-
-
 def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path):
-    model = write_model(
-        tmp_path / 'm.json',
-        load('ur5'),
-        [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}],
-        [np.eye(4)],
-    )
+    zero = [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}]
+    model = write_model(tmp_path / 'm.json', zero, [np.eye(4)])
     out = tmp_path / 'commands'
     said = done('correct', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out)
     nominal = read_recording(cell / 'first', load('ur5')).joints
@@ -303,27 +270,15 @@ def test_a_diagnosis_has_at_most_64_megabytes(tmp_path, size, reason):
 
 def covariances(bag):
     """Stamps, positions and covariances of the poses that a bag says it is sure of."""
-    topic = '/twin/tool_pose_with_covariance'
     with BagReader(bag) as reader:
-        rows = [
-            (
-                m.message.header.stamp.sec * 10**9 + m.message.header.stamp.nanosec,
-                m.message.pose.pose.position,
-                np.reshape(m.message.pose.covariance, (6, 6)),
-            )
-            for m in reader.messages([topic])
-        ]
-    positions = np.array([[p.x, p.y, p.z] for _, p, _ in rows])
-    return np.array([ns for ns, _, _ in rows]), positions, np.array([c for _, _, c in rows])
+        told = [m.message for m in reader.messages(['/twin/tool_pose_with_covariance'])]
+    covariance = np.array([m.pose.covariance for m in told]).reshape(-1, 6, 6)
+    return stamps(told), points(m.pose.pose.position for m in told), covariance
 
 
-def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path):
-    out = tmp_path / 'predicted'
-    model = found / 'diagnosis.json'
-    said = done('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out)
-    assert 'within' in said
-    ns, position = twin_poses(out)
-    sure_ns, sure_position, covariance = covariances(out)
+def test_predict_says_how_sure_it_is_at_every_pose(predicted):
+    ns, position = twin_poses(predicted)
+    sure_ns, sure_position, covariance = covariances(predicted)
     assert np.array_equal(ns, sure_ns)
     # What is promised is the middle of the models allowed: beside the twin's pose, but not far.
     apart = np.linalg.norm(position - sure_position, axis=1)
@@ -331,7 +286,7 @@ def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path):
     np.testing.assert_allclose(covariance, np.swapaxes(covariance, 1, 2), rtol=1e-9)
     assert np.linalg.eigvalsh(covariance).min() > -1e-18
     # The true pose is that of the cell without the instrument's noise of 0.02 mm per axis.
-    measured = read_recording(out, load('ur5')).measured.position
+    measured = read_recording(predicted, load('ur5')).measured.position
     off = measured - sure_position
     whole = covariance[:, :3, :3] + 2e-5**2 * np.eye(3)
     squared = np.einsum('mi,mi->m', off, np.linalg.solve(whole, off[..., None])[..., 0])
@@ -347,12 +302,9 @@ def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tm
     assert json.loads((out / 'prediction.json').read_text()) == {'outside': []}
 
 
-def test_the_table_of_a_prediction_has_columns_for_sigma(cell, found, tmp_path):
-    model, table = found / 'diagnosis.json', tmp_path / 'poses.csv'
-    words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'p', '--table', table)
-    done('simulate', cell / 'second', *words)
-    rows = list(csv.DictReader(table.open()))
-    _, position, covariance = covariances(tmp_path / 'p')
+def test_the_table_of_a_prediction_has_columns_for_sigma(cell, predicted):
+    rows = list(csv.DictReader((cell / 'poses.csv').open()))
+    _, position, covariance = covariances(predicted)
     got = np.array([[float(row[f'{axis}_m']) for axis in 'xyz'] for row in rows])
     np.testing.assert_allclose(got, position, atol=1e-8)
     sigma = np.array([[float(row[f'sigma_{axis}_m']) for axis in 'xyz'] for row in rows])
@@ -360,14 +312,20 @@ def test_the_table_of_a_prediction_has_columns_for_sigma(cell, found, tmp_path):
     assert {row['outside'] for row in rows} <= {'0', '1'}
 
 
+def wrist_goes_on(cell, bag, start=None):
+    """Write and return a motion whose wrist turns 0.96 rad in its last 2 s, maybe from a start."""
+    robot, t = load('ur5'), np.linspace(0.0, 4.0, 401)
+    q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
+    q[:, 3] = (q[:, 3] if start is None else start) + np.clip(t - 2.0, 0.0, 0.96)
+    moved = Recording('far', JointMotion(t, q))
+    write_recording(bag, moved, robot)
+    return moved
+
+
 def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, found, tmp_path):
     data = json.loads((found / 'diagnosis.json').read_text())
     high = data['posterior']['recorded']['joints'][3]['measured'][-1][1]
-    robot = load('ur5')
-    t = np.linspace(0.0, 4.0, 401)
-    q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
-    q[:, 3] = high + np.clip(t - 2.0, 0.0, 0.96)
-    write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
+    moved = wrist_goes_on(cell, tmp_path / 'far', high)
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
     done('simulate', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out)
@@ -378,7 +336,7 @@ def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, foun
     assert mine[0]['t_start'] == pytest.approx(2.0 + margin, abs=0.02)
     assert mine[0]['t_end'] == pytest.approx(4.0)
     _, predicted, covariance = covariances(out)
-    real = Twin(robot, [Backlash('elbow_joint', WIDTH)]).poses(Recording('far', JointMotion(t, q)))
+    real = Twin(load('ur5'), [Backlash('elbow_joint', WIDTH)]).poses(moved)
     for k in (0, -1):
         off = predicted[k] - real.position[k]
         assert off @ np.linalg.solve(covariance[k][:3, :3], off) < chi2.ppf(0.999, 3)
@@ -413,17 +371,11 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
 
 
 def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_path):
-    robot = load('ur5')
-    t = np.linspace(0.0, 4.0, 401)
-    q = np.tile(read_recording(cell / 'first', robot).joints.q[0], (401, 1))
-    q[:, 3] += np.clip(t - 2.0, 0.0, 1.0)
-    write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
-    out = tmp_path / 'commands'
+    out, _ = tmp_path / 'commands', wrist_goes_on(cell, tmp_path / 'far')
     words = ('--robot', 'ur5', '--model', found / 'diagnosis.json', '--out', out)
     assert 'outside what was recorded' in done('correct', tmp_path / 'far', *words)
-    assert (
-        'wrist_1_joint' in json.loads((out / 'prediction.json').read_text())['outside'][0]['why']
-    )
+    outside = json.loads((out / 'prediction.json').read_text())['outside']
+    assert 'wrist_1_joint' in outside[0]['why']
     ns, _, covariance = covariances(out)
     assert ns.size == 401
     assert covariance[-1].trace() > covariance[0].trace()

@@ -54,9 +54,54 @@ def context(robot, language):
     return Context(wt.load(robot), controller_of(wt.load(robot), language), pulses)
 
 
-def read(language, texts, robot):
+def read(language, texts, robot=None):
+    robot = robot or PROGRAMS[language][0]
     sources = [Source(f'file{k}', text) for k, text in enumerate(texts)]
     return read_sources(sources, context(robot, language), language)
+
+
+def moves_of(language, *texts):
+    """Return the moves of a program, piece after piece."""
+    robot = PROGRAMS[language][0]
+    own = context(robot, language)
+    pieces = to_moves(read(language, texts), own.robot, own.controller).pieces
+    return [move for piece in pieces for move in piece]
+
+
+def bracket(language):
+    """Return the texts of the bracket's program."""
+    return [(MADE / name).read_bytes().decode('latin-1') for name in PROGRAMS[language][1]]
+
+
+def bracket_with(language, lines):
+    """Return these texts with more lines where the seam begins."""
+    source, *beside = bracket(language)
+    text = source.replace(BEFORE[language], lines + BEFORE[language], 1)
+    assert text != source
+    return [text, *beside]
+
+
+def table(text):
+    """
+    Return the rows of a table, a tuple of its columns each.
+
+    A column with a slash is lines of a program of the first column's language, where a word with @
+    stands for what `WORDS` has.
+    """
+    rows = [[part.strip() for part in f'{row} '.split(' | ')] for row in text.strip().splitlines()]
+    return [tuple(row) for row in rows]
+
+
+def lines_of(language, text):
+    """Return lines that are parted by slashes in a table, with `WORDS` in place of their names."""
+    words = WORDS[language]
+    text = re.sub(r'@(\w+)', lambda match: words.get(match[1], match[0]), text)
+    return text.split(' / ')
+
+
+def yes(text):
+    """Return which words of a text are yes."""
+    return [word == 'yes' for word in text.split()]
 
 
 # Expected with scipy: capital letters turn about axes that turn along, small ones about fixed axes.
@@ -112,7 +157,7 @@ def test_frames_of_a_taught_kuka_point_come_from_its_data():
         'DECL FDAT FP2={TOOL_NO 2,BASE_NO 3,IPO_FRAME #BASE}\n'
         'BASE_DATA[3]={X 100.0,Y 0.0,Z 0.0,A 90.0,B 0.0,C 0.0}\nENDDAT\n'
     )
-    program = read('krl', (src, dat), 'kuka_kr16_2')
+    program = read('krl', (src, dat))
     first, second = program.steps
     assert (first.tool.name, first.tool.value) == ('2', None)
     np.testing.assert_allclose(first.base.value, np.eye(4))
@@ -128,7 +173,7 @@ def test_a_spline_move_of_kuka_brings_its_own_tool_base_and_speed():
         '$IPO_MODE=SIPO_MODE(FP1.IPO_FRAME), $LOAD=SLOAD(FP1.TOOL_NO), $APO=SAPO(LCPDAT1) C_SPL\n'
     )
     text = 'DEF a()\n' + point + data + move + 'SLIN XP1 WITH $TOOL={X 1}\nEND\n'
-    step, other = read('krl', (text,), 'kuka_kr16_2').steps
+    step, other = read('krl', (text,)).steps
     assert (step.tool.name, step.base.name, step.speed, step.stop) == ('4', '2', 0.25, False)
     assert 'tool or base' in other.tool.why
 
@@ -138,22 +183,21 @@ def test_the_moves_of_a_spline_have_its_tool_and_base_where_they_bring_none():
     data = 'DECL FDAT FP{0}={{TOOL_NO {0},BASE_NO {0},IPO_FRAME #BASE}}\n'
     own = ' WITH $TOOL=STOOL2(FP{0}), $BASE=SBASE(FP{0}.BASE_NO)\n'
     block = f'SPLINE{own.format(4)}SLIN XP1\nSLIN XP1{own.format(5)}ENDSPLINE\nSLIN XP1\n'
-    text = 'DEF a()\n' + point + data.format(4) + data.format(5) + KRL_LONG + block + 'END\n'
-    steps = read('krl', (text,), 'kuka_kr16_2').steps
+    text = f'DEF a()\n{point}{data.format(4)}{data.format(5)}{KRL["long"]}\n{block}END\n'
+    steps = read('krl', (text,)).steps
     assert [step.tool.name for step in steps[:2]] == [step.base.name for step in steps[:2]]
     assert [step.tool.name for step in steps[:2]] == ['4', '5']
     assert steps[2].tool.value[2, 3] == 0.25
 
 
 def test_an_abb_move_that_switches_an_output_has_its_tool_before_it():
-    point = '[[900,0,800],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
     frame = 'PERS wobjdata w:=[FALSE,TRUE,"",[[500,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
     moves = (
-        f'MoveLDO {point}, v9, fine, tool0\\WObj:=w, doArc, 1;\n'
-        f'MoveCSync {point}, {point}, v9, z1, tool0\\WObj:=w, "stir";\n'
+        f'MoveLDO {POINT}, v9, fine, tool0\\WObj:=w, doArc, 1;\n'
+        f'MoveCSync {POINT}, {POINT}, v9, z1, tool0\\WObj:=w, "stir";\n'
     )
     text = f'MODULE m\n{frame}PROC main()\n{moves}ENDPROC\nENDMODULE\n'
-    steps = read('rapid', (text,), 'abb_irb1600').steps
+    steps = read('rapid', (text,)).steps
     assert [step.stop for step in steps] == [True, False]
     assert all(step.base.value[0, 3] == 0.5 and step.tool.value is not None for step in steps)
 
@@ -162,9 +206,8 @@ def test_an_abb_move_that_switches_an_output_has_its_tool_before_it():
     ('speed', 'told'), [('[18.30, 50,50,50]', 0.0183), ('v200', 0.2), ('[1.5E2,500,0,0]', 0.15)]
 )
 def test_an_abb_move_is_as_fast_as_its_line_says(speed, told):
-    point = '[[900,0,800],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
-    text = f'MODULE m\nPROC main()\nMoveL {point}, {speed}, fine, tool0;\nENDPROC\nENDMODULE\n'
-    (step,) = read('rapid', (text,), 'abb_irb1600').steps
+    text = f'MODULE m\nPROC main()\nMoveL {POINT}, {speed}, fine, tool0;\nENDPROC\nENDMODULE\n'
+    (step,) = read('rapid', (text,)).steps
     assert abs(step.speed - told) < 1e-9
 
 
@@ -184,7 +227,7 @@ def test_an_abb_move_is_as_fast_as_its_line_says(speed, told):
 def test_kuka_moves_that_are_not_understood_say_so(line):
     point = 'DECL E6POS {}={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n'
     text = 'DEF a()\n' + point.format('XP1') + point.format('XP2') + f'{line}\nEND\n'
-    (step,) = read('krl', (text,), 'kuka_kr16_2').steps
+    (step,) = read('krl', (text,)).steps
     assert step.end is None and step.why
 
 
@@ -196,298 +239,40 @@ BEFORE = {
     'fanuc-ls': '   5:L P[2]',
 }
 """Where the bracket's seam begins, in each language."""
-FRAME = '{X 10,Y 0,Z 0,A 0,B 0,C 0}'
-IN_FRAME = 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))\n'
-
-
-@pytest.mark.parametrize(
-    ('language', 'lines', 'reason'),
-    [
-        ('krl', '$TOOL.Z = 300\n', 'set in parts'),
-        ('krl', '$BASE.X = 10\n', 'set in parts'),
-        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[2].X = 5\n', 'set anew'),
-        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nBASE_DATA[i] = F\n', 'set anew'),
-        ('krl', f'FRAME F={FRAME}\n$BASE = F\nF.X = F.X + 10\n', 'set anew'),
-        ('krl', f'POS F={FRAME}\nF = XP1\n$BASE = F\n', 'set anew'),
-        ('krl', f'BASE_DATA[2] = {FRAME}\n$BASE = BASE_DATA[2]\nbase_data[2] = F\n', 'set anew'),
-        ('krl', '$IPO_MODE = #TCP\n', 'the tool stands still'),
-        (
-            'krl',
-            'DECL FDAT FX={TOOL_NO 0,BASE_NO 0,IPO_FRAME #TCP}\nFDAT_ACT=FX\n',
-            'stands still',
-        ),
-        ('rapid', 'tTorch.tframe.trans.z := 300;\n', 'set anew'),
-        ('rapid', 'wobjTable.oframe := DefFrame(p10, p20, p30);\n', 'set anew'),
-        ('rapid', 'wobjTable := wobjOther;\n', 'set anew'),
-        ('rapid', 'TTORCH := tOther;\n', 'set anew'),
-        ('urscript', f'F = p[0,0,0.1,0,0,0]\nF[2] = 0.3\n{IN_FRAME}', 'worked out'),
-        ('urscript', f'F = p[0,0,0.1,0,0,0]\nF = pose_add(F, F)\n{IN_FRAME}', 'worked out'),
-        ('urscript', 'T = p[0,0,0.1,0,0,0]\nT[2] = 0.3\nset_tcp(T)\n', 'numbers of T are set'),
-        (
-            'urscript',
-            'movej(get_inverse_kin(Waypoint_1_p, Start_q, tcp=p[0,0,1,0,0,0]))\n',
-            'worked out',
-        ),
-        ('fanuc-ls', '   5:  UTOOL[1]=PR[3] ;\n', 'UTOOL 1 are set'),
-        ('fanuc-ls', '   5:  UTOOL[R[2]]=PR[3] ;\n', 'UTOOL 1 are set'),
-        ('fanuc-ls', '   5:  Touch Offset PR[1] ;\n', 'Touch Offset'),
-        ('inform', 'SETTOOL TL#(1) P001\n', 'TL 1 are set'),
-        ('krl', f'DECL FRAME F={FRAME}\nmeasured(F)\n$BASE = F\n', 'set anew'),
-        ('rapid', 'Measured wobjTable;\n', 'set anew'),
-        ('rapid', 'GetSysData tTorch;\n', 'set anew'),
-        ('krl', '$WORLD.Z = 100\n', 'what bases count from'),
-        ('krl', f'$ROBROOT={FRAME}\n', 'what bases count from'),
-    ],
+POINT = '[[900,0,800],[0.7,0,0.714,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
+WORDS = {
+    'krl': {
+        'frame': '{X 10,Y 0,Z 0,A 0,B 0,C 0}',
+        'based': 'BASE_DATA[2] = {X 10,Y 0,Z 0,A 0,B 0,C 0} / $BASE = BASE_DATA[2]',
+        'long': '$TOOL = {X 0,Y 0,Z 250,A 0,B 0,C 0}',
+        'short': '$TOOL = {X 0,Y 0,Z 90,A 0,B 0,C 0}',
+        'seam': 'LIN {X 900,Y 0,Z 800,A 0,B 90,C 0}',
+        'move': 'LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}',
+        'said': 'LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 0}',
+    },
+    'rapid': {'move': 'MoveL p1,v100,fine,tool0;', 'on': 'PDispSet x;', 'off': 'PDispOff;'},
+    'urscript': {
+        'in_frame': 'movel(pose_trans(F, p[-0.5,-0.2,0.02,2.1,2.3,0]))',
+        'long': 'set_tcp(p[0,0,0.25,0,0,0])',
+        'short': 'set_tcp(p[0,0,0.09,0,0,0])',
+        'seam': 'movel(p[0.3,0.2,0.1,0,3.1,0])',
+        'home': 'movej([0,-1.4,1.6,-1.8,-1.5,0])',
+        'on': 'track_conveyor_linear(p[1,0,0,0,0,0], 9)',
+        'off': 'stop_conveyor_tracking()',
+    },
+    'fanuc-ls': {
+        'move': 'L P[1] 9mm/sec FINE',
+        'on': 'Touch Offset PR[1]',
+        'off': 'Touch Offset End',
+    },
+    'inform': {'move': 'MOVL C00001 V=9.0', 'on': 'SFTON P001', 'off': 'SFTOF'},
+}
+"""Lines that stand in many a case, and what stands in such lines."""
+KRL = WORDS['krl']
+RAPID_HEAD = (
+    f'MODULE m\nCONST robtarget p1 := {POINT};\n'
+    'CONST robtarget p2 := [[0,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n'
 )
-def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, reason):
-    robot, files = PROGRAMS[language]
-    source, *beside = [(MADE / name).read_bytes().decode('latin-1') for name in files]
-    start = BEFORE[language]
-    text = source.replace(start, lines + start, 1)
-    assert text != source
-    program = read(language, (text, *beside), robot)
-    own = context(robot, language).controller
-    moves = [move for piece in to_moves(program, wt.load(robot), own).pieces for move in piece]
-    assert any(move.kind == 'unknown' and reason in move.why for move in moves)
-
-
-def test_a_block_of_ur_that_is_not_known_ends_no_routine_before_its_end():
-    inside = 'switch(a):\ncase 1:\nb()\nend\nend\n'
-    text = 'def p():\nset_tcp(p[0,0,0.1,0,0,0])\n{}movel(p[0.3,0.2,0.1,0,3.1,0])\nend\n'
-    with pytest.raises(TwinError, match="line 7: this 'end' closes no routine"):
-        read('urscript', (text.format(inside),), 'ur5')
-    own = 'sec s():\nset_digital_out(1, True)\nend\n'
-    (step,) = read('urscript', (text.format(own),), 'ur5').steps
-    assert step.tool.value is not None and step.tool.value[2, 3] == 0.1
-
-
-def test_a_program_that_goes_along_with_a_conveyor_is_left():
-    text = (MADE / 'bracket.ls').read_text()
-    for schedule, along in ((0, False), (2, True)):
-        head = f'/APPL\nLINE_TRACK;\n  LINE_TRACK_SCHEDULE_NUMBER : {schedule};\n'
-        steps = read('fanuc-ls', (text.replace('/APPL\n', head),), 'fanuc_m10ia').steps
-        assert {'conveyor' in step.shift.why for step in steps} == {along}
-
-
-@pytest.mark.parametrize(('line', 'known'), [('t.robhold := TRUE;', False), ('x := 5;', True)])
-def test_a_tool_is_known_after_a_routine_that_does_not_set_it(line, known):
-    text = (MADE / 'bracket.mod').read_text().replace('ConfL', 'sub tTorch;\nConfL')
-    sub = f'PROC sub(PERS tooldata t)\n{line}\nENDPROC\nENDMODULE'
-    step = read('rapid', (text.replace('ENDMODULE', sub),), 'abb_irb1600').steps[-1]
-    assert (step.tool.why == '') == known
-
-
-KRL_TOOL = '$TOOL = {{X 0,Y 0,Z {},A 0,B 0,C 0}}\n'
-KRL_CALLED = 'DEF sub()\n$VEL.CP = 0.1\nLIN {X 900,Y 0,Z 800,A 0,B 90,C 0}\nEND\n'
-UR_CALLED = 'def sub():\n  movel(p[0.3,0.2,0.1,0,3.1,0])\nend\n'
-UR_TOOL = 'set_tcp(p[0,0,{},0,0,0])\n'
-
-
-@pytest.mark.parametrize(
-    ('language', 'text', 'length'),
-    [
-        ('krl', 'DEF a()\n' + KRL_TOOL.format(250) + 'sub()\nEND\n' + KRL_CALLED, 0.25),
-        (
-            'krl',
-            'DEF a()\n'
-            + KRL_TOOL.format(250)
-            + 'sub()\n'
-            + KRL_TOOL.format(90)
-            + 'END\n'
-            + KRL_CALLED,
-            None,
-        ),
-        ('urscript', f'def a():\n{UR_CALLED}{UR_TOOL.format(0.25)}sub()\nend\n', 0.25),
-        (
-            'urscript',
-            f'def a():\n{UR_CALLED}{UR_TOOL.format(0.25)}sub()\n{UR_TOOL.format(0.1)}end\n',
-            None,
-        ),
-        (
-            'urscript',
-            f'def a():\n{UR_TOOL.format(0.25)}def sub():\nif (g):\nset_tcp(T)\nend\nend\n'
-            + UR_CALLED.splitlines()[1]
-            + '\nend\n',
-            0.25,
-        ),
-    ],
-)
-def test_a_routine_has_the_tool_of_its_program_where_that_is_one(language, text, length):
-    robot = PROGRAMS[language][0]
-    own = context(robot, language).controller
-    ((move,),) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
-    if length is None:
-        assert move.kind == 'unknown' and 'other routines' in move.why
-    else:
-        away = np.linalg.norm(move.tool[:3, 3] - own.flange[:3, 3])
-        np.testing.assert_allclose(away, length, atol=1e-12)
-
-
-KRL_SEAM = 'LIN {X 900,Y 0,Z 800,A 0,B 90,C 0}\n'
-UR_SEAM = 'movel(p[0.3,0.2,0.1,0,3.1,0])\n'
-KRL_LONG, KRL_SHORT = KRL_TOOL.format(250), KRL_TOOL.format(90)
-UR_LONG, UR_SHORT = UR_TOOL.format(0.25), UR_TOOL.format(0.09)
-
-
-@pytest.mark.parametrize(
-    ('language', 'parts', 'known'),
-    [
-        ('krl', ['IF x THEN', KRL_SHORT, 'ENDIF', KRL_SEAM], [False]),
-        ('krl', ['IF x THEN', KRL_LONG, 'ENDIF', KRL_SEAM], [True]),
-        ('krl', ['IF x THEN', KRL_SHORT, KRL_SEAM, 'ELSE', KRL_SEAM, 'ENDIF'], [True, True]),
-        ('krl', ['IF x THEN', KRL_SHORT, 'ELSE', KRL_SHORT, 'ENDIF', KRL_SEAM], [True]),
-        (
-            'krl',
-            ['SWITCH n', 'CASE 1', KRL_SHORT, 'DEFAULT', KRL_LONG, 'ENDSWITCH', KRL_SEAM],
-            [False],
-        ),
-        (
-            'krl',
-            ['SWITCH n', 'CASE 1', KRL_SHORT, 'DEFAULT', KRL_SHORT, 'ENDSWITCH', KRL_SEAM],
-            [True],
-        ),
-        ('krl', ['LOOP', KRL_SEAM, KRL_SHORT, KRL_SEAM, 'ENDLOOP'], [False, True]),
-        ('krl', ['LOOP', KRL_SHORT, KRL_SEAM, 'ENDLOOP', KRL_LONG, KRL_SEAM], [True, True]),
-        ('krl', ['WHILE x', KRL_SHORT, KRL_SEAM, 'ENDWHILE', KRL_SEAM], [True, False]),
-        ('krl', ['IF x THEN', '$IPO_MODE = #TCP', 'ENDIF', KRL_SEAM], [False]),
-        ('krl', ['IF x THEN', '$BASE.X = 5', 'ENDIF', KRL_SEAM], [False]),
-        ('krl', ['LOOP', KRL_SEAM, '$IPO_MODE = #TCP', 'ENDLOOP'], [False]),
-        ('urscript', ['if (x):', UR_SHORT, 'end', UR_SEAM], [False]),
-        ('urscript', ['if (x):', UR_SHORT, 'else:', UR_SHORT, 'end', UR_SEAM], [True]),
-        (
-            'urscript',
-            ['if (x):', UR_SHORT, 'elif (y):', UR_SEAM, 'else:', UR_SHORT, 'end', UR_SEAM],
-            [True, False],
-        ),
-        ('urscript', ['while (True):', UR_SEAM, UR_SHORT, UR_SEAM, 'end'], [False, True]),
-        ('urscript', ['while (True):', UR_SHORT, UR_SEAM, 'end'], [True]),
-        # A loop that is left halfway: the tool of its end is not what holds after it.
-        (
-            'krl',
-            ['LOOP', KRL_SHORT, 'IF x THEN', 'EXIT', 'ENDIF', KRL_LONG, 'ENDLOOP', KRL_SEAM],
-            [False],
-        ),
-        (
-            'krl',
-            ['LOOP', KRL_LONG, 'IF x THEN', 'EXIT', 'ENDIF', KRL_SEAM, 'ENDLOOP', KRL_SEAM],
-            [True, True],
-        ),
-        (
-            'urscript',
-            ['while (x):', UR_SHORT, 'if (y):', 'break', 'end', UR_LONG, 'end', UR_SEAM],
-            [False],
-        ),
-        (
-            'urscript',
-            ['while (x):', UR_SEAM, UR_SHORT, 'if (y):', 'continue', 'end', UR_LONG, 'end'],
-            [False],
-        ),
-    ],
-)
-def test_a_frame_that_not_every_way_sets_is_not_known_after_it(language, parts, known):
-    head, first, end = {
-        'krl': ('DEF a()\n$BASE = $NULLFRAME\n', KRL_LONG, 'END\n'),
-        'urscript': ('def a():\n', UR_LONG, 'end\n'),
-    }[language]
-    text = head + first + ''.join(part.rstrip('\n') + '\n' for part in parts) + end
-    robot = PROGRAMS[language][0]
-    own = context(robot, language).controller
-    (moves,) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
-    assert [move.kind != 'unknown' for move in moves] == known
-
-
-KRL_SETS = f'DEF sub()\nother()\nEND\nDEF other()\n{KRL_SHORT}END\n'
-UR_SETS = f'def sub():\n{UR_SHORT}end\n'
-RAPID_SEAM = (
-    'MODULE m\n'
-    'CONST robtarget p1 := [[900,0,800],[0.7,0,0.714,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
-    'CONST robtarget p2 := [[0,0,9],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
-    'PROC main()\nsub;\nMoveL p1,v100,fine,tool0;\nENDPROC\nPROC sub()\n{}ENDPROC\nENDMODULE\n'
-)
-
-
-@pytest.mark.parametrize(
-    ('language', 'text', 'reason'),
-    [
-        ('krl', f'DEF a()\n{KRL_LONG}sub()\n{KRL_SEAM}END\n{KRL_SETS}', 'other routines'),
-        ('krl', f'DEF a()\n{KRL_LONG}sub()\n{KRL_LONG}{KRL_SEAM}END\n{KRL_SETS}', ''),
-        ('krl', f'DEF a()\n{KRL_SHORT}sub()\n{KRL_SEAM}END\n{KRL_SETS}', ''),
-        ('krl', f'DEF a()\n{KRL_LONG}up:\n{KRL_SEAM}{KRL_SHORT}GOTO up\nEND\n', 'other routines'),
-        ('krl', f'DEF a()\n{KRL_LONG}up:\n{KRL_SEAM}GOTO up\nEND\n', ''),
-        ('urscript', f'def a():\n{UR_SETS}{UR_LONG}sub()\n{UR_SEAM}end\n', 'other routines'),
-        ('urscript', f'def a():\n{UR_SETS}{UR_LONG}{UR_SEAM}sub()\nend\n', ''),
-        ('rapid', RAPID_SEAM.format('PDispSet x;\n'), 'sub, called at'),
-        ('rapid', RAPID_SEAM.format('PDispSet x;\nMoveL p2,v9,fine,tool0;\nPDispOff;\n'), ''),
-    ],
-)
-def test_what_a_routine_sets_holds_after_its_call(language, text, reason):
-    robot = PROGRAMS[language][0]
-    own = context(robot, language).controller
-    move = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces[0][0]
-    assert (move.kind == 'unknown') == bool(reason) and reason in move.why
-
-
-RAPID_CALLS = RAPID_SEAM.partition('PROC sub')[0] + 'ENDMODULE\n'
-RAPID_OTHER = 'MODULE n\nPROC {}()\n{}ENDPROC\nENDMODULE\n'
-RAPID_TOOL = RAPID_CALLS.replace(
-    'PROC main',
-    'PERS tooldata t:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\nPROC main',
-).replace('tool0', 't')
-KRL_CALLS = f'DEF a()\n{KRL_LONG}sub()\n{KRL_SEAM}END\n'
-
-
-@pytest.mark.parametrize(
-    ('language', 'text', 'others', 'known'),
-    [
-        ('krl', KRL_CALLS, [KRL_SETS], False),
-        (
-            'krl',
-            KRL_CALLS,
-            [KRL_SETS.partition('DEF other')[0], f'DEF other()\n{KRL_SHORT}END\n'],
-            False,
-        ),
-        ('krl', KRL_CALLS, ['DEF sub()\nEND\n', f'DEF other()\n{KRL_SHORT}END\n'], True),
-        ('krl', KRL_CALLS + 'DEF sub()\nEND\n', [KRL_SETS], True),
-        ('rapid', RAPID_CALLS, [RAPID_OTHER.format('sub', 'PDispSet x;\n')], False),
-        ('rapid', RAPID_CALLS, [RAPID_OTHER.format('x', 'PDispSet x;\n')], True),
-        ('rapid', RAPID_TOOL, [RAPID_OTHER.format('sub', 't.tframe.trans.z := 5;\n')], False),
-        ('rapid', RAPID_TOOL, [RAPID_OTHER.format('sub', '')], True),
-        ('fanuc-ls', ['CALL SUB', 'L P[1] 9mm/sec FINE'], ['Touch Offset PR[1]'], False),
-        ('fanuc-ls', ['CALL SUB', 'L P[1] 9mm/sec FINE'], ['UTOOL[1]=PR[3]'], False),
-        (
-            'fanuc-ls',
-            ['CALL SUB', 'L P[1] 9mm/sec FINE'],
-            ['Touch Offset PR[1]', 'Touch Offset End'],
-            True,
-        ),
-        ('inform', ['CALL JOB:SUB', 'MOVL C00001 V=9.0'], ['SFTON P001'], False),
-        ('inform', ['CALL JOB:SUB', 'MOVL C00001 V=9.0'], ['SETTOOL TL#(1) P003'], False),
-        ('inform', ['CALL JOB:SUB-2', 'MOVL C00001 V=9.0'], ['SFTON P001'], True),
-    ],
-)
-def test_what_a_routine_of_another_file_sets_holds_after_its_call(language, text, others, known):
-    if isinstance(text, list):
-        head, form, tail = {
-            'fanuc-ls': ('/PROG {}\n/MN\n', '   1:{} ;\n', TP_TAIL),
-            'inform': (JOB_HEAD.replace('NAME A', 'NAME {}'), '{}\n', 'END\n'),
-        }[language]
-        text, *others = (
-            head.format(name) + ''.join(map(form.format, lines)) + tail
-            for name, lines in (('A', text), ('SUB', others))
-        )
-    robot = PROGRAMS[language][0]
-    beside = tuple(Source(f'other{k}', other) for k, other in enumerate(others))
-    own = context(robot, language)._replace(beside=beside)
-    step = read_sources([Source('file', text)], own, language).steps[-1]
-    assert bool(step.tool.why or step.shift.why) != known
-
-
-ABB_MOVE, ABB_ON, ABB_OFF = 'MoveL p1,v100,fine,tool0;', 'PDispSet x;', 'PDispOff;'
-TP_MOVE, TP_ON, TP_OFF = 'L P[1] 9mm/sec FINE', 'Touch Offset PR[1]', 'Touch Offset End'
-JOB_MOVE, JOB_ON, JOB_OFF = 'MOVL C00001 V=9.0', 'SFTON P001', 'SFTOF'
-KRL_MOVE = 'LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}'
-UR_MOVE, UR_HOME = 'movel(p[0.3,0.2,0.1,0,3.1,0])', 'movej([0,-1.4,1.6,-1.8,-1.5,0])'
-UR_ON, UR_OFF = 'track_conveyor_linear(p[1,0,0,0,0,0], 9)', 'stop_conveyor_tracking()'
 JOB_HEAD = (
     '/JOB\n//NAME A\n//POS\n///TOOL 1\n///POSTYPE ROBOT\nC00001=900,0,300,180,0,0\n//INST\nNOP\n'
 )
@@ -495,86 +280,261 @@ TP_TAIL = (
     '/POS\nP[1]{\n GP1:\n UF : 0, UT : 1,\n X = 900 mm, Y = 0 mm, Z = 300 mm,\n W = 180 deg, '
     'P = 0 deg, R = 0 deg\n};\n/END\n'
 )
+AROUND = {
+    'rapid': (RAPID_HEAD, '{}\n', 'ENDPROC\nENDMODULE\n'),
+    'fanuc-ls': ('/PROG A\n/MN\n', '   1:{} ;\n', TP_TAIL),
+    'inform': (JOB_HEAD, '{}\n', 'END\n'),
+    'urscript': ('def a():\n', '{}\n', 'end\n'),
+    'krl': ('DEF a()\n', '{}\n', 'END\n'),
+}
+"""What stands before the lines of a program, how one is written, and what stands after them."""
 
 
-@pytest.mark.parametrize(
-    ('language', 'lines', 'known'),
-    [
-        ('rapid', [ABB_ON, 'IF a THEN', ABB_OFF, 'ENDIF', ABB_MOVE], [False]),
-        ('rapid', [ABB_ON, f'IF a {ABB_OFF}', ABB_MOVE], [False]),
-        ('rapid', [ABB_ON, 'IF a THEN', ABB_OFF, 'ELSE', ABB_OFF, 'ENDIF', ABB_MOVE], [True]),
-        ('rapid', ['TEST n', 'CASE 1:', ABB_ON, 'DEFAULT:', 'ENDTEST', ABB_MOVE], [False]),
-        ('rapid', ['WHILE a DO', ABB_MOVE, ABB_ON, 'ENDWHILE', ABB_OFF, ABB_MOVE], [False, True]),
-        ('rapid', ['FOR i FROM 1 TO 3 DO', ABB_ON, ABB_OFF, ABB_MOVE, 'ENDFOR'], [True]),
-        ('rapid', ['up:', ABB_MOVE, ABB_ON, 'GOTO up;'], [False]),
-        ('rapid', ['up:', ABB_MOVE, 'GOTO up;'], [True]),
-        ('rapid', ['sub;', ABB_ON, 'IF a sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE], [False]),
-        ('rapid', [ABB_ON, ABB_OFF, 'sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE], [True]),
-        (
-            'rapid',
-            [ABB_ON, 'a;', 'ENDPROC', 'PROC a()', 'sub;', 'ENDPROC', 'PROC sub()', ABB_MOVE],
-            [False],
-        ),
-        ('fanuc-ls', [TP_ON, 'IF (DI[1]=ON) THEN', TP_OFF, 'ENDIF', TP_MOVE], [False]),
-        ('fanuc-ls', [TP_ON, 'IF DI[1]=ON,JMP LBL[1]', TP_OFF, 'LBL[1]', TP_MOVE], [False]),
-        ('fanuc-ls', [TP_ON, TP_OFF, TP_MOVE], [True]),
-        ('fanuc-ls', ['LBL[1:up]', TP_MOVE], [True]),
-        ('fanuc-ls', ['L @P[1] 9mm/sec FINE'], [True]),
-        ('inform', [JOB_ON, 'IFTHENEXP I001=1', JOB_OFF, 'ENDIF', JOB_MOVE], [False]),
-        ('inform', [JOB_ON, 'JUMP *A IF IN#(1)=ON', JOB_OFF, '*A', JOB_MOVE], [False]),
-        ('inform', [JOB_ON, JOB_OFF, JOB_MOVE], [True]),
-        ('inform', ['*A', JOB_MOVE], [True]),
-        (
-            'rapid',
-            ['CONNECT i WITH t;', ABB_MOVE, 'ENDPROC', 'TRAP t', ABB_ON, 'ENDTRAP', 'PROC b()'],
-            [False],
-        ),
-        ('urscript', [UR_ON, UR_HOME, UR_MOVE], [True, False, False]),
-        ('urscript', [UR_ON, UR_OFF, UR_MOVE], [True, True, True]),
-        ('urscript', ['path_offset_set(x, 2)', UR_HOME, UR_MOVE], [True, False, False]),
-        ('urscript', ['if a:', UR_ON, 'end', UR_MOVE], [True, False]),
-        ('urscript', ['def b():', UR_ON, 'end', 'b()', UR_MOVE], [True, False]),
-        ('urscript', ['def b():', UR_MOVE, 'end', UR_ON, 'b()'], [False, True]),
-        ('urscript', ['def b():', UR_MOVE, 'end', 'b()'], [True]),
-        ('fanuc-ls', ['MP Offset PR[1] RPM[1]', TP_MOVE], [False]),
-        ('fanuc-ls', ['Track TAST[1]', TP_MOVE, 'Track End', TP_MOVE], [False, True]),
-        ('fanuc-ls', ['CALL TRACK_PART', TP_MOVE, f'{TP_MOVE} COORD'], [True, False]),
-        ('inform', ['COMARCON ASF#(1)', JOB_MOVE, 'COMARCOF', JOB_MOVE], [False, True]),
-        ('rapid', ['SoftAct 2,50;', ABB_MOVE, 'SoftDeact;', ABB_MOVE], [False, True]),
-        ('rapid', [ABB_MOVE.replace(';', '\\Corr;'), ABB_MOVE], [False, True]),
-        ('krl', ['RET=RSI_ON(#RELATIVE)', KRL_MOVE, 'RET=RSI_OFF()', KRL_MOVE], [False, True]),
-    ],
-)
+def program_of(language, lines):
+    """Return the text of a program with lines of a table."""
+    head, form, tail = AROUND[language]
+    return head + ''.join(form.format(line) for line in lines_of(language, lines)) + tail
+
+
+SET_ON_THE_WAY = r"""
+krl | $TOOL.Z = 300 | set in parts
+krl | $BASE.X = 10 | set in parts
+krl | @based / BASE_DATA[2].X = 5 | set anew
+krl | @based / BASE_DATA[i] = F | set anew
+krl | FRAME F=@frame / $BASE = F / F.X = F.X + 10 | set anew
+krl | POS F=@frame / F = XP1 / $BASE = F | set anew
+krl | @based / base_data[2] = F | set anew
+krl | DECL FRAME F=@frame / measured(F) / $BASE = F | set anew
+krl | $IPO_MODE = #TCP | the tool stands still
+krl | DECL FDAT FX={TOOL_NO 0,BASE_NO 0,IPO_FRAME #TCP} / FDAT_ACT=FX | stands still
+krl | $WORLD.Z = 100 | what bases count from
+krl | $ROBROOT=@frame | what bases count from
+rapid | tTorch.tframe.trans.z := 300; | set anew
+rapid | wobjTable.oframe := DefFrame(p10, p20, p30); | set anew
+rapid | wobjTable := wobjOther; | set anew
+rapid | TTORCH := tOther; | set anew
+rapid | Measured wobjTable; | set anew
+rapid | GetSysData tTorch; | set anew
+urscript | F = p[0,0,0.1,0,0,0] / F[2] = 0.3 / @in_frame | worked out
+urscript | F = p[0,0,0.1,0,0,0] / F = pose_add(F, F) / @in_frame | worked out
+urscript | T = p[0,0,0.1,0,0,0] / T[2] = 0.3 / set_tcp(T) | numbers of T are set
+urscript | movej(get_inverse_kin(Waypoint_1_p, Start_q, tcp=p[0,0,1,0,0,0])) | worked out
+fanuc-ls | 5:  UTOOL[1]=PR[3] ; | UTOOL 1 are set
+fanuc-ls | 5:  UTOOL[R[2]]=PR[3] ; | UTOOL 1 are set
+fanuc-ls | 5:  Touch Offset PR[1] ; | Touch Offset
+inform | SETTOOL TL#(1) P001 | TL 1 are set
+"""
+
+
+@pytest.mark.parametrize(('language', 'lines', 'reason'), table(SET_ON_THE_WAY))
+def test_what_a_program_sets_on_its_way_is_not_taken_for_known(language, lines, reason):
+    more = ''.join(f'{line}\n' for line in lines_of(language, lines))
+    moves = moves_of(language, *bracket_with(language, more))
+    assert any(move.kind == 'unknown' and reason in move.why for move in moves)
+
+
+def test_a_block_of_ur_that_is_not_known_ends_no_routine_before_its_end():
+    inside = 'switch(a):\ncase 1:\nb()\nend\nend\n'
+    text = 'def p():\nset_tcp(p[0,0,0.1,0,0,0])\n{}movel(p[0.3,0.2,0.1,0,3.1,0])\nend\n'
+    with pytest.raises(TwinError, match="line 7: this 'end' closes no routine"):
+        read('urscript', (text.format(inside),))
+    own = 'sec s():\nset_digital_out(1, True)\nend\n'
+    (step,) = read('urscript', (text.format(own),)).steps
+    assert step.tool.value is not None and step.tool.value[2, 3] == 0.1
+
+
+def test_a_program_that_goes_along_with_a_conveyor_is_left():
+    text = (MADE / 'bracket.ls').read_text()
+    for schedule, along in ((0, False), (2, True)):
+        head = f'/APPL\nLINE_TRACK;\n  LINE_TRACK_SCHEDULE_NUMBER : {schedule};\n'
+        steps = read('fanuc-ls', (text.replace('/APPL\n', head),)).steps
+        assert {'conveyor' in step.shift.why for step in steps} == {along}
+
+
+@pytest.mark.parametrize(('line', 'known'), [('t.robhold := TRUE;', False), ('x := 5;', True)])
+def test_a_tool_is_known_after_a_routine_that_does_not_set_it(line, known):
+    text = (MADE / 'bracket.mod').read_text().replace('ConfL', 'sub tTorch;\nConfL')
+    sub = f'PROC sub(PERS tooldata t)\n{line}\nENDPROC\nENDMODULE'
+    step = read('rapid', (text.replace('ENDMODULE', sub),)).steps[-1]
+    assert (step.tool.why == '') == known
+
+
+CALLED = """
+krl | @long / sub() / END / DEF sub() / $VEL.CP = 0.1 / @seam | yes
+krl | @long / sub() / @short / END / DEF sub() / $VEL.CP = 0.1 / @seam | no
+urscript | def sub(): / @seam / end / @long / sub() | yes
+urscript | def sub(): / @seam / end / @long / sub() / @short | no
+urscript | @long / def sub(): / if (g): / set_tcp(T) / end / end / @seam | yes
+"""
+
+
+@pytest.mark.parametrize(('language', 'lines', 'known'), table(CALLED))
+def test_a_routine_has_the_tool_of_its_program_where_that_is_one(language, lines, known):
+    (move,) = moves_of(language, program_of(language, lines))
+    if known == 'no':
+        assert move.kind == 'unknown' and 'other routines' in move.why
+    else:
+        flange = context(PROGRAMS[language][0], language).controller.flange
+        away = np.linalg.norm(move.tool[:3, 3] - flange[:3, 3])
+        np.testing.assert_allclose(away, 0.25, atol=1e-12)
+
+
+WAYS = """
+krl | IF x THEN / @short / ENDIF / @seam | no
+krl | IF x THEN / @long / ENDIF / @seam | yes
+krl | IF x THEN / @short / @seam / ELSE / @seam / ENDIF | yes yes
+krl | IF x THEN / @short / ELSE / @short / ENDIF / @seam | yes
+krl | SWITCH n / CASE 1 / @short / DEFAULT / @long / ENDSWITCH / @seam | no
+krl | SWITCH n / CASE 1 / @short / DEFAULT / @short / ENDSWITCH / @seam | yes
+krl | LOOP / @seam / @short / @seam / ENDLOOP | no yes
+krl | LOOP / @short / @seam / ENDLOOP / @long / @seam | yes yes
+krl | WHILE x / @short / @seam / ENDWHILE / @seam | yes no
+krl | IF x THEN / $IPO_MODE = #TCP / ENDIF / @seam | no
+krl | IF x THEN / $BASE.X = 5 / ENDIF / @seam | no
+krl | LOOP / @seam / $IPO_MODE = #TCP / ENDLOOP | no
+urscript | if (x): / @short / end / @seam | no
+urscript | if (x): / @short / else: / @short / end / @seam | yes
+urscript | if (x): / @short / elif (y): / @seam / else: / @short / end / @seam | yes no
+urscript | while (True): / @seam / @short / @seam / end | no yes
+urscript | while (True): / @short / @seam / end | yes
+krl | LOOP / @short / IF x THEN / EXIT / ENDIF / @long / ENDLOOP / @seam | no
+krl | LOOP / @long / IF x THEN / EXIT / ENDIF / @seam / ENDLOOP / @seam | yes yes
+urscript | while (x): / @short / if (y): / break / end / @long / end / @seam | no
+urscript | while (x): / @seam / @short / if (y): / continue / end / @long / end | no
+"""
+"""The last four leave a loop halfway: the tool of its end is not what holds after it."""
+
+
+@pytest.mark.parametrize(('language', 'ways', 'known'), table(WAYS))
+def test_a_frame_that_not_every_way_sets_is_not_known_after_it(language, ways, known):
+    first = '$BASE = $NULLFRAME / ' if language == 'krl' else ''
+    moves = moves_of(language, program_of(language, f'{first}@long / {ways}'))
+    assert [move.kind != 'unknown' for move in moves] == yes(known)
+
+
+SUB = {
+    'krl': 'END / DEF sub() / other() / END / DEF other() / @short',
+    'urscript': 'def sub(): / @short / end',
+    'rapid': 'sub; / @move / ENDPROC / PROC sub()',
+}
+"""A routine that sets something; where one may stand below the program, or what calls it."""
+AFTER_A_CALL = f"""
+krl | @long / sub() / @seam / {SUB['krl']} | other routines
+krl | @long / sub() / @long / @seam / {SUB['krl']} |
+krl | @short / sub() / @seam / {SUB['krl']} |
+krl | @long / up: / @seam / @short / GOTO up | other routines
+krl | @long / up: / @seam / GOTO up |
+urscript | {SUB['urscript']} / @long / sub() / @seam | other routines
+urscript | {SUB['urscript']} / @long / @seam / sub() |
+rapid | {SUB['rapid']} / @on | sub, called at
+rapid | {SUB['rapid']} / @on / MoveL p2,v9,fine,tool0; / @off |
+"""
+
+
+@pytest.mark.parametrize(('language', 'lines', 'reason'), table(AFTER_A_CALL))
+def test_what_a_routine_sets_holds_after_its_call(language, lines, reason):
+    move = moves_of(language, program_of(language, lines))[0]
+    assert (move.kind == 'unknown') == bool(reason) and reason in move.why
+
+
+RAPID_CALLS = f'{RAPID_HEAD}sub;\nMoveL p1,v100,fine,tool0;\nENDPROC\nENDMODULE\n'
+RAPID_OTHER = 'MODULE n\nPROC {}()\n{}ENDPROC\nENDMODULE\n'
+IN_ANOTHER_FILE = """
+krl | @long / sub() / @seam | DEF sub() / other() / END / DEF other() / @short / END | no
+krl | @long / sub() / @seam | DEF sub() / other() / END // DEF other() / @short / END | no
+krl | @long / sub() / @seam | DEF sub() / END // DEF other() / @short / END | yes
+krl | @long / sub() / @seam / END / DEF sub() | DEF sub() / @short / END | yes
+rapid | sub; / @move | PROC sub() / @on / ENDPROC | no
+rapid | sub; / @move | PROC x() / @on / ENDPROC | yes
+rapid | sub; / MoveL p1,v9,fine,t; | PROC sub() / t.tframe.trans.z := 5; / ENDPROC | no
+rapid | sub; / MoveL p1,v9,fine,t; | PROC sub() / ENDPROC | yes
+fanuc-ls | CALL SUB / @move | @on | no
+fanuc-ls | CALL SUB / @move | UTOOL[1]=PR[3] | no
+fanuc-ls | CALL SUB / @move | @on / @off | yes
+inform | CALL JOB:SUB / @move | @on | no
+inform | CALL JOB:SUB / @move | SETTOOL TL#(1) P003 | no
+inform | CALL JOB:SUB-2 / @move | @on | yes
+"""
+TORCH = 'PERS tooldata t:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n'
+
+
+@pytest.mark.parametrize(('language', 'lines', 'others', 'known'), table(IN_ANOTHER_FILE))
+def test_what_a_routine_of_another_file_sets_holds_after_its_call(language, lines, others, known):
+    text = program_of(language, lines).replace('PROC main', f'{TORCH}PROC main')
+    beside = []
+    for k, other in enumerate(others.split(' // ')):
+        if language in ('krl', 'rapid'):
+            other = ''.join(f'{line}\n' for line in lines_of(language, other))
+            other = other if language == 'krl' else f'MODULE n\n{other}ENDMODULE\n'
+        else:
+            other = program_of(language, other)
+            other = other.replace('PROG A', 'PROG SUB').replace('NAME A', 'NAME SUB')
+        beside.append(Source(f'other{k}', other))
+    own = context(PROGRAMS[language][0], language)._replace(beside=tuple(beside))
+    step = read_sources([Source('file', text)], own, language).steps[-1]
+    assert [not (step.tool.why or step.shift.why)] == yes(known)
+
+
+DISPLACED = r"""
+rapid | @on / IF a THEN / @off / ENDIF / @move | no
+rapid | @on / IF a @off / @move | no
+rapid | @on / IF a THEN / @off / ELSE / @off / ENDIF / @move | yes
+rapid | TEST n / CASE 1: / @on / DEFAULT: / ENDTEST / @move | no
+rapid | WHILE a DO / @move / @on / ENDWHILE / @off / @move | no yes
+rapid | FOR i FROM 1 TO 3 DO / @on / @off / @move / ENDFOR | yes
+rapid | up: / @move / @on / GOTO up; | no
+rapid | up: / @move / GOTO up; | yes
+rapid | sub; / @on / IF a sub; / ENDPROC / PROC sub() / @move | no
+rapid | @on / @off / sub; / ENDPROC / PROC sub() / @move | yes
+rapid | @on / a; / ENDPROC / PROC a() / sub; / ENDPROC / PROC sub() / @move | no
+rapid | CONNECT i WITH t; / @move / ENDPROC / TRAP t / @on / ENDTRAP / PROC b() | no
+rapid | SoftAct 2,50; / @move / SoftDeact; / @move | no yes
+rapid | MoveL p1,v100,fine,tool0\Corr; / @move | no yes
+rapid | PDispOn p5, tool0; / @move / @off / @move | no yes
+fanuc-ls | @on / IF (DI[1]=ON) THEN / @off / ENDIF / @move | no
+fanuc-ls | @on / IF DI[1]=ON,JMP LBL[1] / @off / LBL[1] / @move | no
+fanuc-ls | @on / @off / @move | yes
+fanuc-ls | LBL[1:up] / @move | yes
+fanuc-ls | L @P[1] 9mm/sec FINE | yes
+fanuc-ls | MP Offset PR[1] RPM[1] / @move | no
+fanuc-ls | Track TAST[1] / @move / Track End / @move | no yes
+fanuc-ls | CALL TRACK_PART / @move / @move COORD | yes no
+inform | @on / IFTHENEXP I001=1 / @off / ENDIF / @move | no
+inform | @on / JUMP *A IF IN#(1)=ON / @off / *A / @move | no
+inform | @on / @off / @move | yes
+inform | *A / @move | yes
+inform | COMARCON ASF#(1) / @move / COMARCOF / @move | no yes
+urscript | @on / @home / @seam | yes no no
+urscript | @on / @off / @seam | yes yes yes
+urscript | path_offset_set(x, 2) / @home / @seam | yes no no
+urscript | if a: / @on / end / @seam | yes no
+urscript | def b(): / @on / end / b() / @seam | yes no
+urscript | def b(): / @seam / end / @on / b() | no yes
+urscript | def b(): / @seam / end / b() | yes
+krl | RET=RSI_ON(#RELATIVE) / @move / RET=RSI_OFF() / @move | no yes
+"""
+
+
+@pytest.mark.parametrize(('language', 'lines', 'known'), table(DISPLACED))
 def test_a_displacement_holds_wherever_one_of_the_ways_brings_it(language, lines, known):
-    head, form, tail = {
-        'rapid': (RAPID_SEAM.partition('sub;')[0], '{}\n', 'ENDPROC\nENDMODULE\n'),
-        'fanuc-ls': ('/PROG A\n/MN\n', '   1:{} ;\n', TP_TAIL),
-        'inform': (JOB_HEAD, '{}\n', 'END\n'),
-        'urscript': ('def a():\n', '{}\n', 'end\n'),
-        'krl': ('DEF a()\n', '{}\n', 'END\n'),
-    }[language]
-    text = head + ''.join(form.format(line) for line in lines) + tail
-    steps = read(language, (text,), PROGRAMS[language][0]).steps
-    assert [not step.shift.why for step in steps] == known
+    steps = read(language, (program_of(language, lines),)).steps
+    assert [not step.shift.why for step in steps] == yes(known)
 
 
-@pytest.mark.parametrize(
-    ('language', 'text'),
-    [
-        (
-            'rapid',
-            RAPID_SEAM.partition('PROC')[0]
-            + 'PERS tooldata t:=[TRUE,[[0,0,9],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n'
-            'PROC weld(PERS tooldata t)\nMoveL p1,v9,fine,t;\nENDPROC\nENDMODULE\n',
-        ),
-        ('krl', f'DEF a(F:IN)\nFRAME F={FRAME}\n{KRL_LONG}$BASE = F\n{KRL_SEAM}END\n'),
-        ('urscript', f'T = p[0,0,0.1,0,0,0]\ndef sub(T):\nset_tcp(T)\n{UR_SEAM}end\n'),
-    ],
-)
-def test_what_a_routine_is_handed_is_not_the_frame_of_that_name(language, text):
-    robot = PROGRAMS[language][0]
-    own = context(robot, language).controller
-    ((move,),) = to_moves(read(language, (text,), robot), wt.load(robot), own).pieces
+HANDED = {
+    'rapid': f'{RAPID_HEAD.partition("PROC")[0]}{TORCH}PROC weld(PERS tooldata t)\n'
+    'MoveL p1,v9,fine,t;\nENDPROC\nENDMODULE\n',
+    'krl': 'DEF a(F:IN)\nFRAME F={frame}\n{long}\n$BASE = F\n{seam}\nEND\n',
+    'urscript': 'T = p[0,0,0.1,0,0,0]\ndef sub(T):\nset_tcp(T)\n{seam}\nend\n',
+}
+
+
+@pytest.mark.parametrize('language', HANDED)
+def test_what_a_routine_is_handed_is_not_the_frame_of_that_name(language):
+    text = HANDED[language]
+    for word, line in WORDS[language].items():
+        text = text.replace(f'{{{word}}}', line)
+    (move,) = moves_of(language, text)
     assert move.kind == 'unknown'
 
 
@@ -583,79 +543,71 @@ def test_a_tool_that_stands_still_is_not_that_of_the_robot_file():
     robot = wt.load('abb_irb1600')
     torch = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, 0.2]))
     own = controller_of(robot.with_frames(tool=torch), 'rapid')
-    program = read('rapid', (source,), 'abb_irb1600')
+    program = read('rapid', (source,))
     moves = [move for piece in to_moves(program, robot, own).pieces for move in piece]
     assert {move.kind for move in moves} == {'unknown'}
 
 
-@pytest.mark.parametrize(
-    ('language', 'tool', 'reason'),
-    [
-        ('krl', '$TOOL = TOOL_DATA[1]', ''),
-        ('krl', '$TOOL = TORCH', ''),
-        ('krl', '$TOOL = TOOL_DATA[I]', 'worked out'),
-        ('krl', 'BAS(#TOOL, I)', 'worked out'),
-        ('krl', '$TOOL = TOOL_DATA[1]:WEAR', 'worked out'),
-        ('krl', 'TORCH = BARE:WEAR\n$TOOL = TORCH', 'are set at file0 line 2'),
-        ('rapid', 'tTorch', ''),
-        ('rapid', 'tTorches{i}', 'worked out'),
-        ('rapid', 'CTool()', 'worked out'),
-        ('rapid', 'tSet', 'are set at file0 line'),
-        ('urscript', 'set_tcp(TCP_1)', ''),
-        ('urscript', 'set_tcp(tcps[i])', 'worked out'),
-        ('urscript', 'T = tool_of(2)\nset_tcp(T)', 'are set at file0 line 2'),
-    ],
-)
+WORKED_OUT = """
+krl | $TOOL = TOOL_DATA[1] |
+krl | $TOOL = TORCH |
+krl | $TOOL = TOOL_DATA[I] | worked out
+krl | BAS(#TOOL, I) | worked out
+krl | $TOOL = TOOL_DATA[1]:WEAR | worked out
+krl | TORCH = BARE:WEAR / $TOOL = TORCH | are set at file0 line 2
+rapid | tTorch |
+rapid | tTorches{i} | worked out
+rapid | CTool() | worked out
+rapid | tSet | are set at file0 line
+urscript | set_tcp(TCP_1) |
+urscript | set_tcp(tcps[i]) | worked out
+urscript | T = tool_of(2) / set_tcp(T) | are set at file0 line 2
+"""
+
+
+@pytest.mark.parametrize(('language', 'tool', 'reason'), table(WORKED_OUT))
 def test_a_tool_that_is_worked_out_is_not_that_of_the_robot_file(language, tool, reason):
     text = {
-        'krl': f'DEF a()\n{tool}\n$BASE = $NULLFRAME\n{KRL_MOVE}\nEND\n',
-        'rapid': RAPID_SEAM.partition('sub;')[0]
-        + f'tSet := tOther;\nMoveL p1,v9,fine,{tool};\nENDPROC\nENDMODULE\n',
-        'urscript': f'def a():\n{tool}\n{UR_MOVE}\nend\n',
+        'krl': f'{tool} / $BASE = $NULLFRAME / @move',
+        'rapid': f'tSet := tOther; / MoveL p1,v9,fine,{tool};',
+        'urscript': f'{tool} / @seam',
     }[language]
     robot = wt.load(PROGRAMS[language][0])
     torch = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, 0.2]))
     own = controller_of(robot.with_frames(tool=torch), language)
-    *_, move = to_moves(read(language, (text,), PROGRAMS[language][0]), robot, own).pieces[-1]
+    program = read(language, (program_of(language, text),))
+    *_, move = to_moves(program, robot, own).pieces[-1]
     assert (move.kind == 'unknown') == bool(reason) and reason in move.why
 
 
-@pytest.mark.parametrize(
-    ('language', 'line'),
-    [
-        ('rapid', 'TriggLDPO p10, v100, fine, tTorch;\n'),
-        ('rapid', 'MovePnP pElsewhere, v100, fine, tElsewhere;\n'),
-        ('rapid', 'SearchL di1, pHere, p10, v10, tTorch;\n'),
-        ('rapid', 'EGMRunJoint egm1, EGM_STOP_HOLD;\n'),
-        ('urscript', 'servoc(p[0,0,0.1,0,0,0])\n'),
-        ('inform', 'SMOVL C00001 V=100.0\n'),
-        ('inform', 'SYMOVL C00001 V=100.0 CV#(1)\n'),
-        ('inform', 'MOVL C00001 V=100.0\n  +MOVJ C00002 VJ=10.0\n'),
-        ('fanuc-ls', '   5:L P[3] 8mm/sec FINE RTCP    ;\n'),
-    ],
-)
-def test_moves_of_another_kind_end_what_is_known(language, line):
-    robot, files = PROGRAMS[language]
-    source, *beside = [(MADE / name).read_bytes().decode('latin-1') for name in files]
-    start = BEFORE[language]
-    text = source.replace(start, line + start, 1)
-    assert text != source
-    before, after = (read(language, (each, *beside), robot).steps for each in (source, text))
-    unknown = [
-        sum(step.end is None or step.shift.why != '' for step in each) for each in (before, after)
-    ]
-    assert unknown[1] == unknown[0] + 1
+OF_ANOTHER_KIND = """
+rapid | TriggLDPO p10, v100, fine, tTorch;
+rapid | MovePnP pElsewhere, v100, fine, tElsewhere;
+rapid | SearchL di1, pHere, p10, v10, tTorch;
+rapid | EGMRunJoint egm1, EGM_STOP_HOLD;
+urscript | servoc(p[0,0,0.1,0,0,0])
+inform | SMOVL C00001 V=100.0
+inform | SYMOVL C00001 V=100.0 CV#(1)
+inform | MOVL C00001 V=100.0 /   +MOVJ C00002 VJ=10.0
+fanuc-ls | 5:L P[3] 8mm/sec FINE RTCP    ;
+"""
+
+
+@pytest.mark.parametrize(('language', 'lines'), table(OF_ANOTHER_KIND))
+def test_moves_of_another_kind_end_what_is_known(language, lines):
+    more = ''.join(f'{line}\n' for line in lines.split(' / '))
+    before, after = (
+        sum(step.end is None or step.shift.why != '' for step in read(language, texts).steps)
+        for texts in (bracket(language), bracket_with(language, more))
+    )
+    assert after == before + 1
 
 
 def test_instructions_that_move_nothing_end_nothing():
-    source = (MADE / 'bracket.mod').read_text()
     calls = 'TPWrite "at " \\Pos:=p10.trans;\npNow := CRobT(\\Tool:=tTorch);\nVelSet 50, 800;\nRETURN;\n'
     weighed = 'tTorch.tload.mass := 3;\n'
-    start = BEFORE['rapid']
-    text = source.replace(start, calls + weighed + start, 1)
-    program, own = read('rapid', (text,), 'abb_irb1600'), context('abb_irb1600', 'rapid')
-    pieces = to_moves(program, own.robot, own.controller).pieces
-    assert all(move.kind != 'unknown' for piece in pieces for move in piece)
+    moves = moves_of('rapid', *bracket_with('rapid', calls + weighed))
+    assert all(move.kind != 'unknown' for move in moves)
 
 
 def test_joints_of_several_axes_beside_a_trajectory_are_no_second_one():
@@ -672,7 +624,7 @@ def test_joints_of_several_axes_beside_a_trajectory_are_no_second_one():
 def test_what_ends_no_statement_is_read_in_the_time_of_other_lines(line):
     source = (MADE / 'bracket.mod').read_text().replace('MODULE', line * 20_000 + 'MODULE', 1)
     begin = time.process_time()
-    read('rapid', (source,), 'abb_irb1600')
+    read('rapid', (source,))
     assert time.process_time() - begin < 20.0  # some seconds; minutes where a statement may go on
 
 
@@ -684,15 +636,13 @@ def test_places_count_their_lines():
 def test_several_trajectories_in_a_file_are_refused():
     source = (MADE / 'bracket.yaml').read_text()
     with pytest.raises(TwinError, match='several trajectories'):
-        read('joint-trajectory', (f'{source}\n---\n{source}',), 'ur5')
+        read('joint-trajectory', (f'{source}\n---\n{source}',))
 
 
 @pytest.mark.parametrize('before', ['\xef\xbb\xbf', '# \xc3\x85land, \x85\n', '\xef\xbb\xbf# a\n'])
 def test_marks_and_letters_of_other_alphabets_part_no_lines(before):
     source = (MADE / 'bracket.csv').read_text()
-    assert len(read('csv', (before + source,), 'ur5').steps) == len(
-        read('csv', (source,), 'ur5').steps
-    )
+    assert len(read('csv', (before + source,)).steps) == len(read('csv', (source,)).steps)
 
 
 @pytest.mark.parametrize(
@@ -708,25 +658,13 @@ def test_abb_places_derived_from_a_point_go_along_with_it(call, moved):
         '[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n'
         f'MoveL {call},v100,fine,tool0;\nENDPROC\nENDMODULE\n'
     )
-    program = read('rapid', (text,), 'abb_irb1600')
+    program = read('rapid', (text,))
     (step,) = program.steps
     assert not step.end.leads
     before = np.eye(4) if step.end.before is None else step.end.before
     after = np.eye(4) if step.end.after is None else step.end.after
     place = before @ program.points[step.end.point].value @ after
     np.testing.assert_allclose(place[:3, 3], moved, atol=1e-12)
-
-
-def test_abb_targets_under_a_displacement_are_not_touched():
-    text = (
-        'MODULE M\nPROC main()\nPDispOn p5, tool0;\n'
-        'MoveJ [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n'
-        'PDispOff;\n'
-        'MoveJ [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n'
-        'ENDPROC\nENDMODULE\n'
-    )
-    displaced, plain = read('rapid', (text,), 'abb_irb1600').steps
-    assert 'displaces' in displaced.shift.why and not plain.shift.why
 
 
 @pytest.mark.parametrize(
@@ -739,7 +677,7 @@ def test_fanuc_points_that_something_else_uses_are_left(line, held):
         for k in (1, 2)
     )
     text = f'/PROG A\n/MN\n 1:J P[1] 5% FINE ;\n 2:  !P[1] ;\n 3:{line} ;\n/POS\n{points}/END\n'
-    program = read('fanuc-ls', (text,), 'fanuc_m10ia')
+    program = read('fanuc-ls', (text,))
     assert {program.points[k].name for k in program.fixed} == held
 
 
@@ -748,38 +686,28 @@ def test_fanuc_points_that_something_else_uses_are_left(line, held):
     [('krl', 1, 0.4), ('rapid', 5, 0.3), ('urscript', 1, 0.3), ('inform', 1, 0.3), ('fanuc-ls', 1, 0.3)],
 )  # fmt: skip
 def test_a_wait_makes_the_move_before_it_last_longer(language, place, seconds):
-    robot, files = PROGRAMS[language]
-    texts = [(MADE / name).read_bytes().decode('latin-1') for name in files]
-    steps = read(language, texts, robot).steps
+    steps = read(language, bracket(language)).steps
     assert [step.dwell for step in steps] == [seconds * (k == place) for k in range(len(steps))]
     assert steps[place].stop
 
 
-KRL_SAID = KRL_MOVE.replace('}', ',E1 0}')
+RAILS = """
+krl | PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 500} / @move / @said | 0 1
+krl | PTP {E1 500} / @move / @said | 0
+krl | PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,A7 7} / @move | 0 1
+krl | XHOME.E1 = RAIL / @move / @said | 0
+krl | PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 0.0} / @move / @said |
+rapid | MoveExtJ rail,v100,fine; / @move | 0 1
+rapid | @move |
+inform | BC00000=500000 / //INST / MOVJ BC00000 VJ=9.0 / @move | 0
+inform | BC00000=0 / //INST / @move |
+"""
 
 
-@pytest.mark.parametrize(
-    ('language', 'lines', 'held'),
-    [
-        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 500}', KRL_MOVE, KRL_SAID], [0, 1]),
-        ('krl', ['PTP {E1 500}', KRL_MOVE, KRL_SAID], [0]),
-        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,A7 7}', KRL_MOVE], [0, 1]),
-        ('krl', ['XHOME.E1 = RAIL', KRL_MOVE, KRL_SAID], [0]),
-        ('krl', ['PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6,E1 0.0}', KRL_MOVE, KRL_SAID], []),
-        ('rapid', ['MoveExtJ rail,v100,fine;', ABB_MOVE], [0, 1]),
-        ('rapid', [ABB_MOVE], []),
-        ('inform', ['BC00000=500000\n//INST', 'MOVJ BC00000 VJ=9.0', JOB_MOVE], [0]),
-        ('inform', ['BC00000=0\n//INST', JOB_MOVE], []),
-    ],
-)
+@pytest.mark.parametrize(('language', 'lines', 'held'), table(RAILS))
 def test_points_that_do_not_say_where_a_rail_stands_that_moves_are_left(language, lines, held):
-    head, tail = {
-        'rapid': (RAPID_SEAM.partition('sub;')[0], 'ENDPROC\nENDMODULE\n'),
-        'inform': (JOB_HEAD.partition('//INST')[0], 'END\n'),
-        'krl': ('DEF a()\n', 'END\n'),
-    }[language]
-    text = head + ''.join(f'{line}\n' for line in lines) + tail
-    assert sorted(read(language, (text,), PROGRAMS[language][0]).fixed) == held
+    text = program_of(language, lines).replace('//INST\nNOP\nBC', 'BC')
+    assert sorted(read(language, (text,)).fixed) == [int(k) for k in held.split()]
 
 
 @pytest.mark.parametrize(
@@ -799,7 +727,7 @@ def test_a_point_that_another_program_of_the_folder_uses_is_left(other, held, lo
     program = read_sources([Source('file', text)], own, 'rapid')
     assert bool(program.fixed) == (held and not local)
     where = {'XA': 'GLOBAL ', 'XB': ''}
-    points = [f'DECL {word}POS {name}={KRL_MOVE[4:]}\n' for name, word in where.items()]
+    points = [f'DECL {word}POS {name}={KRL["move"][4:]}\n' for name, word in where.items()]
     sources = [Source('a.src', 'DEF a()\nLIN XA\nLIN XB\nEND\n'), Source('a.dat', ''.join(points))]
     own = context('kuka_kr16_2', 'krl')
     own = own._replace(beside=(Source('b.src', 'DEF b()\nLIN XA\nLIN XB\nEND\n'),))
@@ -839,17 +767,17 @@ def test_flags_that_ask_for_another_posture_than_before_are_not_followed(languag
 def test_numbers_of_a_table_that_are_not_read_are_told():
     (name,) = PROGRAMS['csv'][1]
     lines = (MADE / name).read_text().splitlines()
-    assert not read('csv', ('\n'.join(lines),), 'ur5').notes
+    assert not read('csv', ('\n'.join(lines),)).notes
     head, *rows = lines[1:]
     text = '\n'.join([f'rail,{head}', *(f'{k},{row}' for k, row in enumerate(rows))])
-    assert 'the numbers of rail are not read' in read('csv', (text,), 'ur5').notes[0]
+    assert 'the numbers of rail are not read' in read('csv', (text,)).notes[0]
 
 
 def test_a_wait_is_of_its_own_routine_and_one_before_any_move_of_none():
     axes = 'A2 -85.0,A3 100.0,A4 5.0,A5 70.0,A6 -3.0'
     one, two, three = (f'PTP {{A1 {k},{axes}}}\n' for k in (1, 2, 3))
     text = f'DEF a()\n{one}END\nDEF b()\nWAIT SEC 9\n{two}{three}WAIT SEC 1.5\nEND\n'
-    steps = read('krl', (text,), 'kuka_kr16_2').steps
+    steps = read('krl', (text,)).steps
     assert [step.dwell for step in steps] == [0.0, 0.0, 1.5]
     assert [step.where for step in steps] == [f'file0 line {k}' for k in (2, 6, 7)]
 
@@ -859,7 +787,7 @@ def test_a_point_that_is_declared_twice_is_refused_with_its_line():
         'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
     )
     with pytest.raises(TwinError, match='file0 line 3: p1 is declared twice'):
-        read('rapid', (text,), 'abb_irb1600')
+        read('rapid', (text,))
 
 
 def broken(text, draw):
@@ -883,13 +811,11 @@ def broken(text, draw):
 
 @pytest.mark.parametrize('language', PROGRAMS)
 def test_broken_programs_are_refused_in_words_or_change_in_moved_points_alone(language):
-    robot, names = PROGRAMS[language]
-    whole = [(MADE / name).read_bytes().decode('latin-1') for name in names]
-    draw, refused = random.Random(language), 0
+    whole, draw, refused = bracket(language), random.Random(language), 0
     for _ in range(FUZZED):
         texts = [broken(text, draw) for text in whole]
         try:
-            program = read(language, texts, robot)
+            program = read(language, texts)
         except TwinError as error:
             assert re.search(r'file\d line \d+: ', str(error)), error
             refused += 1
@@ -899,6 +825,6 @@ def test_broken_programs_are_refused_in_words_or_change_in_moved_points_alone(la
         for point in points:
             point[..., -1] += [1e-4, -2e-4, 3e-4, 0.0] if point.ndim == 2 else 1e-4
         again = rewritten(program, points, range(len(points)))
-        check_written(program, read(language, again, robot), points)
+        check_written(program, read(language, again), points)
         assert [re.sub(NUMBER, '', t) for t in again] == [re.sub(NUMBER, '', t) for t in texts]
     assert 0.05 * FUZZED < refused < 0.95 * FUZZED

@@ -11,6 +11,7 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.cameras.sightings import Fitted
+from weld_twin_core.diagnosis.algebra.definite import outside, span_of
 from weld_twin_core.diagnosis.soundness.computed import _gap
 from weld_twin_core.diagnosis.soundness.efforts import compared, efforts, with_sign
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
@@ -26,7 +27,7 @@ from weld_twin_core.diagnosis.soundness.richness import (
     refuse_reused,
     repeats,
 )
-from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes, rest_of
+from weld_twin_core.diagnosis.soundness.slips import Rest, Settling, Slip, changes, rest_of
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, clocks, written
 from weld_twin_core.diagnosis.soundness.stuck import _inside
@@ -312,6 +313,41 @@ def test_a_change_explains_what_was_put_in_and_nothing_once_it_is_taken_out(ur5,
     left = base.taken_out(after)
     assert left.change('base').gains(after[None])[0] < 1e-6 * base.gains(after[None])[0]
     assert left.far < 0.2 * rest.far and left.rms(0) < rest.rms(0)
+
+
+def test_a_change_takes_off_what_least_squares_do_beside_frames_and_arm():
+    """Of a recording of poses and one of points; what is sure of it counts every part by its rows."""
+    rng, samples, rows = np.random.default_rng(9), (40, 10), (6, 3)
+    there = np.arange(6) < np.repeat(rows, samples)[:, None]
+    basis = span_of((rng.normal(size=(4, 50, 6)) * there).reshape(4, -1))
+    given = outside((rng.normal(size=(50, 6)) * there).reshape(1, -1), basis)
+    columns, metres = rng.normal(size=(50, 6, 2)) * there[..., None], rng.normal(size=(50, 3, 2))
+    rest = Rest(given.reshape(50, 6), basis, {'base': (columns, metres)}, rows, samples, 1e-4)
+    change, steps = rest.change('base'), np.arange(50) >= np.arange(40, 50)[:, None]
+    np.testing.assert_allclose(change.step_gains(1), change.gains(steps * 1.0), rtol=1e-9)
+    for shape in (rng.uniform(0.0, 1.0, 50), steps[4] * 1.0):
+        every = np.concatenate([basis.T, (columns * shape[:, None, None]).reshape(300, 2)], axis=1)
+        step = np.linalg.lstsq(every, given[0], rcond=None)[0]
+        left = (given[0] - every @ step).reshape(50, 6)
+        gain = (given**2).sum() - (left**2).sum()
+        assert change.gains(shape[None]) == pytest.approx([gain], rel=1e-4)
+        after = change.taken_out(shape)
+        np.testing.assert_allclose(after.residual, left, atol=1e-9)
+        moved = metres[shape > 0.05 * shape.max()] @ step[-2:]
+        assert change.size(shape) == pytest.approx(
+            np.sqrt((moved**2).sum(axis=1).mean()), rel=1e-4
+        )
+        counts = after.share * (1.0 - 6.0 / 270.0) * np.array([150.0, 150.0])
+        falls = [
+            np.log((rest.residual[:, k] ** 2).sum() / (left[:, k] ** 2).sum())
+            for k in (slice(3), slice(3, 6))
+        ]
+        expected = (counts @ falls - 2.0 * np.log(counts.sum())) / 2.0
+        assert change.log_bayes_factor(shape) == pytest.approx(expected, rel=1e-6)
+        assert after.far == pytest.approx((left[:, :3] ** 2).sum())
+    # All but the worst fifth of a recording.
+    off = np.sort((rest.residual[40:, :3] ** 2).sum(axis=1))[:8]
+    assert rest.rms(1) == pytest.approx(1e-4 * np.sqrt(off.mean()))
 
 
 def test_constant_errors_of_an_arm_leave_nothing_that_changed(ur5, rng):

@@ -1,0 +1,163 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a model leaves is told by who made it: the instrument, gears, swings or turns; in any unit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.predicting.leftover import Predicted, leftover
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.reversals import just_turned
+
+COUNT, JOINTS, REGIONS = 768, 3, 6
+NOISE, LEVER = 2e-5, 0.5
+LOST = np.array([0.0, 6e-4, 0.0])
+
+
+def moved(*, at_rest=False):
+    """Return joints that swing, or stations in pairs of nearly one posture."""
+    t = np.arange(COUNT) / 50.0
+    q = np.sin(np.outer(t, [1.0, 3.0, 1.7])) * [1.0, 0.1, 1.0]
+    if at_rest:
+        q = np.repeat(np.random.default_rng(8).uniform(-2.0, 2.0, (COUNT // 2, JOINTS)), 2, axis=0)
+        q[::2] += 1e-4
+    seen = Measurements(t, np.zeros((COUNT, 3)))
+    return Problem((Recording('made', JointMotion(t, q, static=at_rest), seen),))
+
+
+def predicted(error, rng, *, at_rest=False, ways=1e-9, shaken=0.0):
+    """Return shifts (COUNT, 3) of a tool whose turns are a hundredth of them in every metre."""
+    both = np.concatenate([error, 2.0 * error], axis=1)
+    levers = LEVER * rng.normal(size=(JOINTS, COUNT, 6))
+    open_ = ways * np.ones((1, COUNT, 6))
+    return Predicted(
+        error=both,
+        ways=open_,
+        levers=levers,
+        shaken=shaken * np.abs(rng.normal(size=(COUNT, JOINTS))),
+        seen=np.ones((COUNT, 6), dtype=bool),
+        region=np.arange(COUNT) * REGIONS // COUNT,
+        good=np.ones(COUNT, dtype=bool),
+        at_rest=at_rest,
+        left=both,
+        own=open_,
+    )
+
+
+def white(rng, size=NOISE):
+    return size * rng.normal(size=(COUNT, 3))
+
+
+def by_joints(made, sizes):
+    """Return a tool that joints (COUNT, JOINTS) move, besides what it is off by already."""
+    off = np.einsum('nkc,kn->kc', made.levers, sizes)
+    return replace(made, error=made.error + off, left=made.left + off)
+
+
+def told(made, *, noise=NOISE, rough=0.0, lost=LOST, turning=True):
+    gears = np.full(JOINTS, turning)
+    return leftover(moved(at_rest=made.at_rest), made, gears, noise, rough, lost)
+
+
+def on_slides(made, **known):
+    """Return what is left at the tool where no joint has a gear that could have made it."""
+    return told(made, turning=False, **known).position
+
+
+@pytest.mark.parametrize('at_rest', [False, True])
+def test_in_other_units_the_same_is_left(at_rest):
+    """Of lengths, of what joints move by, and of time; a tool that turns is off by as much."""
+    rng = np.random.default_rng(1)
+    made = predicted(white(rng), rng, at_rest=at_rest, ways=4e-6, shaken=1.0)
+    made = by_joints(made, 6e-5 * (1.0 + made.shaken) * rng.normal(size=(COUNT, JOINTS)))
+    made.error[[7, 450], :3] += 3e-3
+    length, turn, time = 3.0, 0.25, 2.0
+    unit = np.repeat([length, 1.0], 3)
+    other = replace(
+        made,
+        **{name: getattr(made, name) * unit for name in ('error', 'ways', 'left', 'own')},
+        levers=made.levers * unit / turn,
+        shaken=made.shaken * turn / time**2,
+    )
+    one = told(made, rough=0.2)
+    two = told(other, noise=length * NOISE, rough=0.2, lost=turn * LOST)
+    factors = (length, 1.0, turn, turn, length, time**2)
+    for before, after, factor in zip(one, two, factors, strict=True):
+        np.testing.assert_allclose(after, factor * np.asarray(before), rtol=1e-5)
+    assert one.position > 0.0 and one.orientation > 0.0 and one.gears.any() and one.peaks.any()
+    assert at_rest or (one.swings > 0.0 and one.turns.any())
+
+
+def test_an_arm_swings_as_much_as_it_is_off_for_how_hard_it_was_accelerated():
+    rng = np.random.default_rng(2)
+    still = predicted(white(rng), rng, shaken=10.0)
+    assert told(still).swings == 0.0
+    swung = by_joints(still, 3e-5 * still.shaken * rng.normal(size=(COUNT, JOINTS)))
+    assert told(swung).swings == pytest.approx(3e-5, rel=0.1)
+    # What the middle of the models followed is the arm's as much as what they left.
+    followed = replace(still, own=3e-5 * still.levers * still.shaken.T[:, :, None])
+    assert told(followed).swings == pytest.approx(3e-5, rel=0.1)
+
+
+def test_motion_is_lost_by_another_law_where_more_is_left_after_turns_than_elsewhere():
+    rng = np.random.default_rng(3)
+    sound, joints = predicted(white(rng), rng), moved().recordings[0].joints
+    near = just_turned(joints, joints.t)[:, 1]
+    assert 0.05 < near.mean() < 0.5
+    late = by_joints(sound, np.outer(near * 3e-4 * rng.normal(size=COUNT), [0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(told(late).turns, LOST / np.sqrt(3.0))
+    # Without, as much as twice the standard error of a mean of squares may hide, a triangle's.
+    varies = 2.0 * NOISE**4 / 3.0 * (1.0 / near.sum() + 1.0 / (~near).sum())
+    size = (sound.levers[1, near, :3] ** 2).mean()
+    most = np.sqrt(3.0 * 2.0 * 2.0 * np.sqrt(varies) / size)
+    bound = told(sound).turns
+    assert 0.0 < bound[1] < 1.2 * most < 0.2 * LOST[1] and not bound[[0, 2]].any()
+    # What open directions account for is no law.
+    open_ = replace(late, ways=np.where(near[:, None], 3e-4 * late.levers[1], 0.0)[None])
+    assert told(open_, lost=2.0 * LOST).turns[1] < 0.9 * told(late, lost=2.0 * LOST).turns[1]
+
+
+@pytest.mark.parametrize(('times', 'strayed'), [(1.45, False), (1.55, True)])
+def test_a_region_strayed_where_one_sample_is_half_as_far_again_as_chance_goes(times, strayed):
+    rng, each = np.random.default_rng(4), COUNT // REGIONS
+    usual = np.array([NOISE * np.sqrt(chi2.median(3)), 0.0, 0.0])
+    made = predicted(np.tile(usual, (COUNT, 1)), rng)
+    chance = NOISE**2 * chi2.ppf(0.5 ** (1.0 / each), 3)
+    made.error[2 * each + 5, :3] = [0.0, times * np.sqrt(chance), 0.0]
+    made.error[4 * each + 5, :3] = 1.0
+    peaks = told(replace(made, good=np.arange(COUNT) != 4 * each + 5), noise=None, rough=1.0).peaks
+    expected = np.zeros(REGIONS)
+    expected[2] = np.sqrt(times**2 * chance - chance) * strayed
+    np.testing.assert_allclose(peaks, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize('at_rest', [False, True])
+def test_of_what_is_left_as_much_is_the_arms_as_neighbours_have_in_common(at_rest):
+    rng, run = np.random.default_rng(5), 2 if at_rest else 8
+    same = np.repeat(rng.normal(size=(COUNT // run, 3)), run, axis=0)
+    error = NOISE * (0.8 * same + 0.6 * rng.normal(size=(COUNT, 3)))
+    found = on_slides(predicted(error, rng, at_rest=at_rest), noise=0.6 * NOISE)
+    assert found == pytest.approx(0.8 * NOISE, rel=0.12)
+    alone = predicted(white(rng), rng, at_rest=at_rest)
+    assert on_slides(alone) < 0.35 * NOISE
+    # Where nothing tells the noise, as much as the arm is rough: half of what real ones are, or all.
+    for rough, share in ((0.5, 1.0), (0.25, 0.5)):
+        left = on_slides(alone, noise=None, rough=rough)
+        assert left == pytest.approx(np.sqrt(share) * NOISE, rel=0.1)
+
+
+def test_neighbours_have_nothing_in_common_that_open_directions_account_for():
+    rng = np.random.default_rng(6)
+    made = predicted(white(rng), rng, at_rest=True)
+    open_ = 3e-5 * np.repeat(rng.normal(size=(8, COUNT // 2, 6)), 2, axis=1)
+    off = np.einsum('r,rkc->kc', rng.choice([-1.0, 1.0], 8), open_)
+    stations = replace(made, left=made.left + off, error=made.error + off, own=open_, ways=open_)
+    assert on_slides(stations) < 0.5 * NOISE
+    # Of a motion they are what the middle of the models followed, and the arm's.
+    bare = predicted(white(rng), rng)
+    followed = replace(bare, own=np.full((1, COUNT, 6), NOISE))
+    assert on_slides(followed) > 2.0 * on_slides(bare)

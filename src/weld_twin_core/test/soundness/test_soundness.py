@@ -3,6 +3,7 @@
 """What is refused, what raises no warning, and what gave way; each mistake: test_kept_findings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from measured_cells import anywhere, asked, moving, recorded, rejointed, remeasu
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.rotation import transform
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis import diagnose, pipeline
+from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
 from weld_twin_core.diagnosis.soundness.mending import Given
@@ -177,6 +179,29 @@ def test_what_gave_way_in_one_of_several_recordings_is_told_where_nothing_explai
     # A model that leaves no step, as where play that the load turns over only looked like one.
     explained = replace(problem, recordings=(plain, replace(plain, name='bad')))
     assert found.refusing_slips(explained, model) is found
+
+
+@pytest.mark.parametrize(
+    ('left_out', 'explained', 'sound'),
+    [((), True, False), (('backlash',), True, True), (('backlash',), False, False)],
+)
+def test_what_was_taken_out_of_the_library_may_be_what_looks_like_a_slip(
+    monkeypatch, left_out, explained, sound
+):
+    """What no effect of those asked for explains is asked of the whole library before it is refused."""
+    kept, refused = (SimpleNamespace(posed=posed) for posed in (('problem', 'model'), None))
+
+    def found(model):
+        return SimpleNamespace(problem='problem', final=SimpleNamespace(model=model))
+
+    def refusing(problem, model):
+        return kept if explained and model == 'of all' else refused
+
+    examined = SimpleNamespace(posed=('problem', 'nominal'), refusing_slips=refusing)
+    searched = ('of few', 'of all')
+    monkeypatch.setattr(pipeline, 'search', lambda _, __, out, *___: found(searched[not out]))
+    told = pipeline._without_slips(found('of few'), examined, left_out, Beliefs(), str)
+    assert told is (kept if sound else refused)
 
 
 def test_a_slip_stays_with_the_robot_and_a_knock_with_its_set_up(ur5):

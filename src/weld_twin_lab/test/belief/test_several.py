@@ -13,10 +13,8 @@ from weld_twin_lab.belief.trial import (
     CROWDED,
     MOST,
     SEVERAL,
-    diagnosed,
     drawn,
     lot_of,
-    recordings_of,
     tried,
 )
 from weld_twin_lab.belief.truth import VISIBLE, shown, whole
@@ -184,10 +182,3 @@ def test_where_one_of_several_causes_has_no_name_the_rest_is_told_and_the_whole_
     (nameless,) = (s for s in row['statements'] if s['kind'] == 'nameless')
     assert nameless['probability'] > 0.5
     assert ['nameless', True] in [[kind, right] for kind, _, right, *_ in kept(row)['examples']]
-
-
-def test_a_ripple_that_was_taken_out_of_the_library_is_no_slip_of_its_joint():
-    """Fifty waves a turn look like a step to all that is left; the arm itself is sound."""
-    case = drawn(194002, 27, SEVERAL).case
-    assert case.excluded == ('transmission_ripple',)
-    assert diagnosed(case, recordings_of(case)).status != 'unsound'

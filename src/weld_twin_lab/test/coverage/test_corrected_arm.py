@@ -50,7 +50,8 @@ def test_a_corrected_arm_keeps_what_its_plan_promised(arm, seed):
         return JointMotion(t, q, static=True), Measurements(t, seen.position)
 
     plan = plan_stations(robot, STATIONS, TOLERANCE, NOISE)
-    found = diagnose(Recording('plan', *driven(plan.q, NOISE)), robot, align='base,tool')
+    seen = Recording('plan', *driven(plan.q, NOISE))
+    found = diagnose(seen, robot, align='base,tool', experiment=False)
     model, posterior = found.model, found.posterior
     effects, _ = posterior.centred(model.found)
     bare = _with_middle_frames(model.twin(0).robot, np.array(posterior.mean[:12]))

@@ -69,9 +69,9 @@ TESTS = {
     'predicting': 'sizes planned steps_by_hand',
     'answer': 'standard_errors contributions pieces_by_hand known_places steps_by_hand',
 }
-"""Which files of tests ask about a room of the engine before all others, by their names. Rooms of
-other packages are asked about by the files that import the modules drawn, and by folders of their
-name."""
+"""Which files of tests ask about a room of the engine before all others, by their names, beside
+those that import the module drawn. Rooms of other packages are asked about by such files alone, and
+by folders of their name."""
 EVERY = 'all'
 """What stands for the rooms of all packages."""
 QUICK = 'not slow and not cells'
@@ -86,11 +86,16 @@ ALIKE = {
         'rows that lie together are told one by one, and are the same'
     ),
     f'{ENGINE}.algebra.problem.Problem.features: 1 -> 2': 'makers of one more model are kept',
+    f'{ENGINE}.levels.causes._contributions: 4 -> 3': 'shares are those of their sum',
     f'{ENGINE}.levels.free_form.Choosing.by_chance: 0 -> -1': (
         'ways to divide the data have the same columns'
     ),
     f'{ENGINE}.levels.free_form.Folds.of: np.diff(labels) >= 0 -> np.diff(labels) < 0': (
         'rows that lie fold by fold are sorted once more, to the same order'
+    ),
+    f'{ENGINE}.many.fitted_together._relearned: '
+    'result.final.coordinates.size <= MANY -> result.final.coordinates.size < MANY': (
+        'with exactly so many either way will do'
     ),
     f'{ENGINE}.soundness.suspicions.turned_bases: 1.0 -> 1.25': (
         'turns of axes onto axes are tens of degrees from where it counts'
@@ -115,6 +120,8 @@ numbers never meet it."""
 COUNTS = ('size', 'count', 'ndim', 'shape')
 GUARD = 1e-9
 """Smaller numbers keep divisions from zero, and larger ones stand for no bound."""
+NOTHING = ('EMPTY', 'FLAT', 'REPEATED', 'ROUNDING')
+"""Names of such numbers: whether one is added or taken off nobody can see."""
 SIGNS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -190,7 +197,8 @@ def ways(node: ast.AST, *, within: bool) -> list[str]:
     if isinstance(node, ast.BoolOp):
         return ['and or']
     if isinstance(node, ast.BinOp) and type(node.op) in SIGNS:
-        return ['sign', 'dropped']
+        nothing = isinstance(node.op, ast.Add | ast.Sub) and last_name(node.right) in NOTHING
+        return [] if nothing else ['sign', 'dropped']
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return ['sign']
     if isinstance(node, ast.Call) and within:
@@ -436,8 +444,10 @@ class Asked:
         except Exception as error:  # as an import would fail
             print(f'not put: {place}: {error!r}', flush=True)
             return 1
-        spent, own = 0.0, names_for(place)
-        for seconds, ran, item in sorted(reach, key=lambda each: each[2].path.stem not in own):
+        spent, own = 0.0, files_for(place)
+        for seconds, ran, item in sorted(
+            reach, key=lambda each: each[2].path.relative_to(ROOT) not in own
+        ):
             inside = not isinstance(top, Function) or (file, first) in ran
             if inside and fails(item):
                 return 1
@@ -463,31 +473,30 @@ def fails(item: Any) -> bool:
 def asking(drawn: Sequence[Place]) -> list[str]:
     """Return the files of tests that ask about drawn mutants."""
     if all(place.module.startswith(f'{ENGINE}.') for place in drawn):
-        return [str(only(name)) for name in sorted(set().union(*map(names_for, drawn)))]
-    wanted = {tuple(place.module.rsplit('.', 1)) for place in drawn}
+        return sorted(map(str, set().union(*map(files_for, drawn))))
     folders = {room_of(place).partition('.')[2] for place in drawn}
-    out = []
-    for file in sorted(
-        [*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py')]
-    ):
-        text = file.read_text(encoding='utf-8')
-        if file.parent.name in folders or any(
-            f'{room}.{name} ' in text or f'{room} import {name}' in text for room, name in wanted
-        ):
-            out.append(str(file))
-    return out
+    files = sorted([*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py')])
+    wanted = {place.module for place in drawn}
+    return [
+        str(file)
+        for file in files
+        if file.parent.name in folders or any(imports(file, module) for module in wanted)
+    ]
 
 
-def names_for(place: Place) -> set[str]:
-    """Return the names of the files that ask about a place of the engine before others."""
+@functools.cache
+def imports(file: Path, module: str) -> bool:
+    """Return whether a file of tests imports a module."""
+    text, (room, _, name) = file.read_text(encoding='utf-8'), module.rpartition('.')
+    return f'{module} ' in text or f'{room} import {name}' in text
+
+
+def files_for(place: Place) -> set[Path]:
+    """Return the files that ask about a place of the engine before others."""
     inside = place.module.removeprefix(f'{ENGINE}.').split('.')[0]
-    return {f'test_{name}' for name in f'{WHOLE} {TESTS.get(inside, "")}'.split()}
-
-
-def only(name: str) -> Path:
-    """Return the one file of tests of a name."""
-    (file,) = (*Path('test').rglob(f'{name}.py'), *Path(CORE).rglob(f'{name}.py'))
-    return file
+    names = {f'test_{name}' for name in f'{WHOLE} {TESTS.get(inside, "")}'.split()}
+    files = (*Path('test').rglob('test_*.py'), *Path(CORE).rglob('test_*.py'))
+    return {file for file in files if file.stem in names or imports(file, place.module)}
 
 
 def room_of(place: Place) -> str:

@@ -83,6 +83,9 @@ def test_turns_of_the_tool_are_open_where_its_point_alone_was_measured():
         '1',
         '2',
     ]
+    # A base that shifts along one axis moves no point along the others, and shows all the same.
+    both = tiny(count=30, align=('base', 'tool'), turned=False)
+    assert len(shown(*both, moving=True)[0]) == 6 + 3
 
 
 @pytest.mark.parametrize(('count', 'knots'), [(60, 7), (450, 21)])

@@ -25,9 +25,9 @@ MADE = {
 }
 
 
-def reported(kind, real, factor, unit=1.0):
+def reported(kind, real, factor, unit=1.0, seed=3):
     """Return a recording with efforts of a real arm, the elbow's times a factor, all in a unit."""
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     run = with_expected_effort(recorded(ROBOT, kind(ROBOT, rng), rng, points=True), real, 1.0)
     rubs = 0.0
     if kind is moving:
@@ -54,6 +54,24 @@ def test_one_cause_of_a_difference_is_told_with_its_size_beside_friction_and_off
         assert (
             by_joint['elbow_joint'].difference_rms > 5.0 * by_joint['wrist_1_joint'].difference_rms
         )
+
+
+def test_joints_are_told_by_what_all_recordings_have():
+    runs = [reported(stations, ROBOT, 1.2, seed=seed) for seed in (4, 5)]
+    model = [with_expected_effort(run, ROBOT, 1.0).effort.value for run in runs]
+    model, seen = (np.concatenate(v) for v in (model, [run.effort.value for run in runs]))
+    found = compared(runs, ROBOT)
+    about, gap = model - model.mean(axis=0), seen - model
+    both = about.ravel(), (seen - seen.mean(axis=0)).ravel()
+    assert found.correlation == pytest.approx(np.corrcoef(*both)[0, 1])
+    assert found.difference == pytest.approx(np.sqrt((gap**2).mean() / (about**2).mean()))
+    for i, told in enumerate(found.joints):
+        sizes = model[:, i].std(), np.sqrt((gap[:, i] ** 2).mean())
+        assert (told.model_rms, told.difference_rms) == pytest.approx(sizes)
+        assert (told.factor is None) is bool(sizes[0] < 0.2 * model.std(axis=0).max())
+        if told.factor is not None:
+            slope, _ = np.polyfit(model[:, i], seen[:, i], 1)
+            assert told.factor == pytest.approx(slope)
 
 
 def test_in_another_unit_of_torque_the_same_is_told():

@@ -1,0 +1,93 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What groups without a formula span holds what effects with one do there: against the twin."""
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.algebra.definite import outside, span_of
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.unseen.groups import GAPS, all_groups
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.recording import Signal
+
+ROBOT = wt.load('ur5')
+SPRING = wt.effects.JointCompliance('shoulder_lift_joint', compliance=1e-5)
+"""What is known of the arm: a load shows through it."""
+ELBOW = {'joint': 'elbow_joint'}
+KNOWN = {
+    'base_pose': ('base', 'constant', {'xyz': [1e-6, -2e-6, 3e-6], 'rotvec': [0.0, 2e-6, -1e-6]}),
+    'tool_pose': ('tool', 'constant', {'xyz': [1e-6, -2e-6, 3e-6], 'rotvec': [0.0, 2e-6, -1e-6]}),
+    'drift': ('base', 'time', {'xyz_rate': [1e-7, -2e-7, 3e-7]}),
+    'thermal_growth': ('base', 'temperature', {'coefficient': 1e-7}),
+    'pedestal_tilt': ('base', 'load', {'compliance': [2e-9, -1e-9]}),
+    'tool_sag': ('tool', 'load', {'sag': [1e-7 * k for k in range(9)]}),
+    'payload': ('load', 'load', {'mass': 1e-3, 'com': [0.0, 0.0, 0.0]}),
+    'measurement_scale': ('instrument', 'place', {'scale': 1e-6}),
+    'link_twist': ('elbow_joint', 'constant', {**ELBOW, 'dalpha': 1e-6}),
+    'gear_ratio': ('elbow_joint', 'angle', {**ELBOW, 'scale': 1e-6}),
+    'joint_compliance': ('elbow_joint', 'load', {**ELBOW, 'compliance': 1e-8}),
+}
+MOVING = {
+    'time_delay': ('clock', 'speed', {'delay': 1e-5}),
+    'backlash': ('elbow_joint', 'direction', {**ELBOW, 'width': GAPS[2]}),
+}
+"""By their names where effects are looked for, on what they depend, and their entries."""
+CASES = [
+    (static, name) for static in (True, False) for name in (KNOWN if static else KNOWN | MOVING)
+]
+
+
+@pytest.fixture(scope='module')
+def asked():
+    """Return a problem at rest and one in motion, the model, and all groups of each."""
+    out = {}
+    for static in (True, False):
+        t, rng = 0.04 * np.arange(200), np.random.default_rng(2)
+        q = 0.5 * np.sin(np.outer(t, 0.7 + 0.3 * np.arange(6)) + np.arange(6.0))
+        q = rng.uniform(-1.5, 1.5, q.shape) if static else q + [0.1, -1.2, 1.5, -1.8, -1.5, 0.3]
+        warm = Signal(t, (20.0 + 6.0 * np.sin(0.3 * t)))
+        run = wt.Recording('run', wt.JointMotion(t, q, static=static), temperature=warm)
+        at = t[5:-5]  # what is late begins and ends otherwise
+        seen = wt.Twin(ROBOT).poses(run, at)
+        problem = Problem((run.with_measured(wt.Measurements(at, seen.position, seen.rotation)),))
+        model = Model(ROBOT, (ROBOT.T_world_base,), (SPRING,))
+        out[static] = problem, model, list(all_groups(problem, model, problem.unit_scale()))
+    return out
+
+
+def moved(problem, model, effect):
+    """Return what an effect does to the whitened rows, as the twin has it."""
+    one, other = (problem.residuals(each) for each in (model, model.with_found((effect,))))
+    scale = problem.unit_scale()
+    return problem.whitened(one, scale) - problem.whitened(other, scale)
+
+
+@pytest.mark.parametrize(('static', 'name'), CASES)
+def test_an_effect_lies_in_what_is_tried_at_its_place_and_of_its_dependence(asked, static, name):
+    at, on, entry = (KNOWN | MOVING)[name]
+    problem, model, groups = asked[static]
+    row = moved(problem, model, effect_from_mapping({'effect': name, **entry}))
+    spans = [span_of(group.columns) for group in groups if (group.at, group.on) == (at, on)]
+    assert min(np.linalg.norm(outside(row, span)) for span in spans) < 3e-3 * np.linalg.norm(row)
+
+
+@pytest.mark.parametrize('static', [True, False])
+def test_the_values_of_a_curve_move_the_tool_as_its_columns_say(asked, static):
+    problem, model, groups = asked[static]
+    rng, curved = np.random.default_rng(3), [group for group in groups if len(group.curves) == 1]
+    assert len({(group.at, group.on) for group in curved}) > 15
+    for group in curved:
+        (curve,), values = group.curves, 1e-6 * rng.normal(size=len(group.scales))
+        row = moved(problem, model, curve.fit.with_coordinates(values))
+        told = (values * group.scales) @ group.columns
+        assert np.linalg.norm(told - row) < 3e-3 * np.linalg.norm(row), str(group)
+
+
+@pytest.mark.parametrize('static', [True, False])
+def test_columns_of_a_group_are_of_one_size_and_those_hardly_recorded_stay_small(asked, static):
+    for group in asked[static][2]:
+        size = np.sqrt((group.columns**2).mean(axis=1))
+        assert size.max() == pytest.approx(1.0) and size.min() > 0.0
+        np.testing.assert_allclose(group.scales.min(), 0.2 * group.scales.max(), rtol=4.0)

@@ -251,7 +251,7 @@ def test_positions_of_another_robot_are_refused_where_the_user_said_how_to_read(
 
 def test_a_length_that_is_neither_metres_nor_millimetres_is_told(tmp_path, ur5):
     q, T = poses(ur5, 40)
-    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3] * 39.37)
+    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3] * 70.0)
     assert '--length-unit decides' in ' '.join(read_table(path, ur5).assumptions)
 
 

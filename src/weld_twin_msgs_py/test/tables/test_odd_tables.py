@@ -114,6 +114,50 @@ def test_units_and_columns_are_those_of_the_header(tmp_path, name):
     np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6, err_msg=str(said))
 
 
+WHOLE = 1e3 * forward(ARM, np.radians(DEG.round()))[:, :3, 3] + 700.0
+LOST = np.where(np.arange(12)[:, None] % 5 == 1, -9999.0, MM)
+MEANT_OTHERWISE = {
+    'inches without a word': (lines(PLAIN, rows(DEG, MM / 25.4)), '--length-unit in'),
+    'inches called mm': (
+        lines(','.join([*J, *(f'{a} [mm]' for a in XYZ)]), rows(DEG, MM / 25.4)),
+        '--length-unit in',
+    ),
+    'radians called degrees': (
+        lines(','.join([*(f'{j} [deg]' for j in J), *XYZ]), rows(Q, MM)),
+        '--angle-unit rad',
+    ),
+    'thousands that look like a decimal comma': (
+        lines(
+            PLAIN.replace(',', ';'),
+            [
+                ';'.join([*(f'{v:.0f}' for v in d), *(f'{v:,.0f}' for v in p)])
+                for d, p in zip(DEG.round(), WHOLE, strict=True)
+            ],
+        ),
+        "--decimal '.'",
+    ),
+    'numbers that stand for no target': (lines(PLAIN, rows(DEG, LOST)), '--skip-rows 2,7,12'),
+}
+
+
+@pytest.mark.parametrize('name', MEANT_OTHERWISE)
+def test_a_table_that_fits_the_arm_when_read_otherwise_is_told_how(tmp_path, name):
+    text, option = MEANT_OTHERWISE[name]
+    with pytest.raises(DataError, match=f'; with {option} they fit: import it so') as told:
+        of(tmp_path, text)
+    assert '\n' not in str(told.value)
+
+
+def test_rows_that_were_pasted_twice_are_no_measurements(tmp_path):
+    recording, said = of(tmp_path, lines(PLAIN, rows(DEG, MM), rows(DEG, MM)[3:7]))
+    np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6)
+    assert any('4 rows are others once more' in each and 'line 14' in each for each in said)
+    coarse = np.tile(MM, (2, 1)).round(1)
+    coarse[12] += 0.1
+    again, _ = of(tmp_path, lines(PLAIN, rows(np.tile(DEG, (2, 1)), coarse)))
+    assert len(again.measured.position) == 24
+
+
 def test_rows_in_which_an_instrument_saw_no_target_are_left_out(tmp_path):
     lost = [2, 5, 6]
     seen = MM.copy()

@@ -74,7 +74,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         )
         alone = _alone(model.get('alone'), robot)
         counted = counted_of(model, robot)
-        named = _named(content.get('verdict'))
+        named = _named(content.get('verdict'), model.get('found', []))
     except (KeyError, TypeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
@@ -104,11 +104,34 @@ def counted_of(model: Mapping[str, Any], robot: Robot) -> Counted | None:
     return Counted.from_mapping(entry, robot.n)
 
 
-def _named(verdict: Any) -> tuple[tuple[str, str | None], ...] | None:
-    """Return name and joint of what a verdict names; None where a file holds a model alone."""
+def _named(verdict: Any, found: list[Any]) -> tuple[tuple[str, str | None], ...] | None:
+    """
+    Return name and joint of what a verdict names; None where a file holds a model alone.
+
+    What is named is a part of what the model has. A verdict that somebody changed would be read in one
+    place and not in another: programs are corrected by the model.
+    """
     if not isinstance(verdict, dict):
         return None
-    return tuple((entry['effect'], entry['joint']) for entry in verdict['effects'])
+    effects = verdict['effects']
+    numbers = [cause.get('effect') for cause in verdict.get('causes') or ()]
+    if any(flat(entry) not in found for entry in effects) or any(
+        number is not None and number >= len(effects) for number in numbers
+    ):
+        raise ModelError(
+            'verdict.effects was changed by hand and is not what the model has, by which programs and '
+            'poses are corrected; take the file as diagnose wrote it, or give effects of your own in an '
+            'effects file'
+        )
+    return tuple((entry['effect'], entry['joint']) for entry in effects)
+
+
+def flat(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entry of an effects file for one of a verdict."""
+    known = {key: value for key, value in entry.items() if key not in ('parameters', 'std')}
+    if known.get('joint') is None:
+        known.pop('joint', None)
+    return {**known, **entry['parameters']}
 
 
 def _alone(entry: Any, robot: Robot) -> Alone | None:

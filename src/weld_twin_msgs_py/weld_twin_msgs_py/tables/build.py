@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table to a recording of stations or of a motion, with every assumption put into words."""
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -21,9 +23,9 @@ from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Rec
 from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
 from .header import Columns, find_columns
-from .joint_readings import Units, counted, joint_angles, joint_units
+from .joint_readings import FITS, Units, counted, joint_angles, joint_units
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
-from .words import EULER_ORDERS, OWN, ROTATION_VECTOR, TableOptions, tokens
+from .words import EULER_ORDERS, OWN, ROTATION_VECTOR, TableOptions, flag_of, tokens
 
 COUNTING = 'how the controller counts (--joint-signs, --joint-offsets, --coupled)'
 """What to look at where orientations disagree with the arm, beside the columns."""
@@ -248,10 +250,16 @@ class _Reading:
         if name is None:
             return None
         values = self.cells.numbers(name)
-        unit = self.columns.unit(name) or ('K' if np.median(values) > _HOT else 'degC')
+        there = np.isfinite(values)
+        if not there.any():
+            return None
+        unit = self.columns.unit(name) or ('K' if np.median(values[there]) > _HOT else 'degC')
         scale = factor(_KELVINS, unit, name, 'the temperature')
-        self.said.append(f'temperature is {name!r} in {unit}')
-        return Signal(t, (values - _FREEZING[unit]) * scale)
+        between = (
+            '' if there.all() else f', and between {there.sum()} of {there.size} rows straight'
+        )
+        self.said.append(f'temperature is {name!r} in {unit}{between}')
+        return Signal(t[there], (values[there] - _FREEZING[unit]) * scale)
 
     def _effort(self, t: Array) -> JointSignal | None:
         """Return the measured efforts; what cannot be used is left out, for few ask for it."""
@@ -353,12 +361,19 @@ class _Reading:
             self.said.append(sentence)
         return rotations(angles, convention)
 
-    def _sigma(self, unit: str) -> Array:
+    def _sigma(self, unit: str) -> Array | None:
         values = self.cells.stack(self.columns.sigma) * [
             factor(METRES, self.columns.unit(name) or unit, name, 'a standard deviation')
             for name in self.columns.sigma
         ]
         names = ', '.join(self.columns.sigma)
+        if values.min() <= 0.0:
+            line = self.cells.lines[int(values.min(axis=1).argmin())]
+            self.said.append(
+                f'the standard deviations {names} are left out: those of line {line} are not above '
+                'zero, and no instrument is so sure'
+            )
+            return None
         self.said.append(f'standard deviations are {names}, joined by mean square')
         return np.asarray(np.sqrt((values**2).mean(axis=1)))
 
@@ -366,8 +381,8 @@ class _Reading:
         """
         Say how far the positions are from the nominal arm, and which rows stand out.
 
-        A table that does not fit is refused where the user said how to read it. Read by its own
-        header it stays as it is: `diagnose` finds out which mistake was made in it.
+        A table that does not fit is refused where another reading does, or where the user said how to
+        read it. Read by its own header it stays as it is: `diagnose` finds out which mistake was made.
         """
         if len(q) < 8:
             self.said.append('too few rows to check the positions against the arm')
@@ -387,7 +402,13 @@ class _Reading:
         if typical > _WRONG * reach:
             sentence = (
                 f'positions are {typical * 1e3:.3g} mm from where robot {self.robot.name!r} would be, '
-                'with base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
+                'with base and tool fitted'
+            )
+            remedy = self._remedy(q)
+            if remedy:
+                raise DataError(f'{sentence}; {remedy} they fit: import it so')
+            sentence += (
+                ': wrong robot, joint columns, or units; --joint-columns, '
                 f'--angle-unit, --length-unit and {COUNTING} decide'
             )
             if self.options.joint_columns or self.options.angle_unit or self.options.length_unit:
@@ -403,6 +424,38 @@ class _Reading:
                 f'{off[worst[0]] * 1e3:.3g} mm; they are kept, --skip-rows {",".join(rows)} leaves '
                 f'{"them" if far.size <= _LISTED else "the worst"} out'
             )
+
+    def _remedy(self, q: Array) -> str:
+        """Return what brings positions and arm together, in words; empty where nothing does."""
+        result = [(min(FITS, replace(self, said=[])._relative_misfit(q) / CLEARLY), '')]
+        for words, other in self._others():
+            with suppress(DataError):
+                quiet = replace(other, said=[])
+                read = joint_angles(
+                    quiet.cells, self.robot, self.columns.joints, quiet.options, []
+                )
+                result.append((quiet._relative_misfit(read), words))
+        return min(result)[1]
+
+    def _others(self) -> Iterator[tuple[str, '_Reading']]:
+        """Return what else a table may mean, and how it is then to be read."""
+        for option, values in (('length_unit', METRES), ('angle_unit', ('rad', 'deg'))):
+            for unit in values:
+                given: dict[str, Any] = {option: unit}
+                yield (
+                    f'with {flag_of(option)} {unit}',
+                    replace(self, options=replace(self.options, **given)),
+                )
+        sign = '.' if self.cells.decimal == ',' else ','
+        yield f"with --decimal '{sign}'", replace(self, cells=replace(self.cells, decimal=sign))
+        seen = self.cells.stack(self.columns.position or self.columns.target)
+        off = np.linalg.norm(seen - np.median(seen, axis=0), axis=1)
+        near = off <= _FAR * np.median(off)
+        if not near.all():
+            far = [self.lines.index(self.cells.lines[k]) + 1 for k in np.flatnonzero(~near)]
+            rows = ','.join(map(str, sorted({*far, *self.options.skip_rows})))
+            cells = self.cells.taken(np.flatnonzero(near))
+            yield f'with --skip-rows {rows}', replace(self, cells=cells)
 
 
 def own_epoch(path: Path) -> int:
@@ -427,13 +480,33 @@ def _lost(cells: Cells, columns: Columns) -> NDArray[np.bool_]:
     return zero if 1 < zero.sum() < zero.size else np.zeros_like(zero)
 
 
+def _copies(
+    cells: Cells, columns: Columns, needed: tuple[str, ...], said: list[str]
+) -> NDArray[np.intp]:
+    """
+    Return the rows that were pasted twice: a diagnosis would take them for an instrument without noise.
+
+    A posture that was measured again differs in its last digits, unless these are coarse; then other
+    postures differ.
+    """
+    clock = tuple(name for name in (columns.date, columns.time) if name)
+    _, first = cells.alike(needed + clock)
+    copies = np.setdiff1d(np.arange(len(cells.rows)), first)
+    if not copies.size or len(first) > len(cells.alike(columns.joints)[1]):
+        return np.empty(0, np.intp)
+    said.append(
+        f'{copies.size} rows are others once more, digit by digit, and left out, the first in line '
+        f'{cells.lines[copies[0]]}: what is measured again differs in its last digits'
+    )
+    return copies
+
+
 def _usable(
     cells: Cells, columns: Columns, options: TableOptions, said: list[str]
 ) -> tuple[Cells, Cells]:
     """Return the rows with all that is needed, and those with all joints, those to skip in neither."""
     needed = columns.joints + columns.position + columns.target + columns.difference
     needed += columns.rotation + columns.sigma
-    needed += () if columns.temperature is None else (columns.temperature,)
     values = cells.stack(needed)
     whole = np.isfinite(values).all(axis=1)
     asked = np.zeros(len(cells.rows), bool)
@@ -454,6 +527,7 @@ def _usable(
             'was there, count positions from another origin'
         )
     keep = np.flatnonzero(whole & ~asked & ~lost)
+    keep = np.delete(keep, _copies(cells.taken(keep), columns, needed, said))
     if not keep.size:
         raise DataError(f"table '{cells.path}' has no complete row")
     for k, j in np.argwhere(np.abs(values[keep]) > _FARTHEST)[:1]:

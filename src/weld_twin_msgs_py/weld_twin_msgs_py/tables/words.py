@@ -14,7 +14,7 @@ ROTATION_VECTOR = 'rotvec'
 _CHOICES = {
     'delimiter': (',', ';', '\t'),
     'decimal': ('.', ','),
-    'length_unit': ('m', 'mm'),
+    'length_unit': ('m', 'mm', 'cm', 'um', 'in', 'ft'),
     'angle_unit': ('rad', 'deg'),
     'slide_unit': ('m', 'mm'),
     'rotation_unit': ('rad', 'deg'),

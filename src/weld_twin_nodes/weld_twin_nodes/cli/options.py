@@ -85,7 +85,7 @@ rare:
 --clamped                both ends of the chain hold one bar, and the table has joint angles alone
 --clock-offset S         added to the stamps of --measured [default: 0]
 where the header does not tell:
---length-unit {m,mm}     unit of lengths
+--length-unit {m,mm,cm,um,in,ft}  unit of lengths
 --angle-unit {rad,deg}   unit of the joint angles
 rare:
 --slide-unit {m,mm}      unit of joints that slide

@@ -17,7 +17,7 @@ from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
+from weld_twin_msgs_py.files.diagnosis_model import flat, load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.yaml_file import parse_yaml, read_yaml
@@ -150,20 +150,12 @@ def _diagnosed(robot: Robot, path: Path | str, data: Mapping[str, Any]) -> Twin:
     if 'model' in data:
         return load_model(robot, path)
     try:
-        result = [_flat(entry) for entry in data['verdict']['effects']]
+        result = [flat(entry) for entry in data['verdict']['effects']]
         return Twin(robot, effects_from_list(result, robot))
     except (KeyError, TypeError, AttributeError):
         raise ModelError(f"diagnosis '{path}' has no list 'verdict.effects'") from None
     except ModelError as error:
         raise ModelError(f"diagnosis '{path}': {error}") from None
-
-
-def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry of an effects file for one of a diagnosis."""
-    known = {key: value for key, value in entry.items() if key not in ('parameters', 'std')}
-    if known.get('joint') is None:
-        known.pop('joint', None)
-    return {**known, **entry['parameters']}
 
 
 def given_cameras(

@@ -1,0 +1,41 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnosis files that somebody changed with an editor."""
+
+import json
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.errors import ModelError
+from weld_twin_msgs_py.files.diagnosis_model import read_model
+
+ELBOW = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
+NAMED = {**ELBOW, 'parameters': {'offset': 2e-3}, 'std': {'offset': 1e-5}}
+
+
+@pytest.mark.parametrize(
+    'effects',
+    [
+        [{**NAMED, 'parameters': {'offset': -2e-3}}],
+        [{**NAMED, 'joint': 'wrist_1_joint'}],
+        [NAMED, {**NAMED, 'joint': 'wrist_1_joint'}],
+        [],
+    ],
+    ids=['sign', 'joint', 'one more', 'taken out'],
+)
+def test_a_verdict_that_is_not_what_the_model_has_is_refused(tmp_path, effects):
+    file = tmp_path / 'diagnosis.json'
+    frame = np.eye(4).tolist()
+    model = {'tool': frame, 'bases': [frame], 'found': [{**ELBOW, 'offset': 2e-3}]}
+    verdict = {'effects': [NAMED], 'causes': [{'effect': 0}, {'effect': None}]}
+    content = {'schema': 'weld_twin/diagnosis/2', 'model': model, 'verdict': verdict}
+    robot = catalog.load('ur5')
+    file.write_text(json.dumps(content))
+    assert read_model(robot, file).named == (('joint_offset', 'elbow_joint'),)
+    verdict['effects'] = effects
+    file.write_text(json.dumps(content))
+    with pytest.raises(ModelError, match='effects was changed by hand') as told:
+        read_model(robot, file)
+    assert str(file) in str(told.value)

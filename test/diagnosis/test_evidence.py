@@ -135,3 +135,60 @@ def test_a_seed_found_among_many_pays_for_the_search():
     y = 0.5 * columns[0] + rng.normal(size=200)
     free, searched = (best(columns, y, 200.0, trials) for trials in (1.0, 80.0))
     assert free.log_bayes - searched.log_bayes == pytest.approx(np.log(80.0))
+
+
+SEEDS = ((0, 1), (2,), (3, 4, 5), (6, 7), (8, 9, 10), (11,))
+"""Columns of every seed, of units with one, two and three of them."""
+
+
+def grown_by_hand(own, columns, y, index):
+    """Return the columns of a seed that pay as they enter one by one, or all, and their evidence."""
+
+    def worth(some):
+        both = np.concatenate([own, columns[some]])
+        left = [y - b.T @ np.linalg.lstsq(b.T, y, rcond=None)[0] for b in (own, both)]
+        before, after = (r @ r for r in left)
+        return evidence(before, before - after, float(len(some)), 200.0)
+
+    some, now = [], -np.inf
+    while len(some) < len(index):
+        more = max(({*index} - {*some}), key=lambda k: worth([*some, k]))
+        if worth([*some, more]) <= now:
+            break
+        some, now = [*some, more], worth([*some, more])
+    return max((now, sorted(some)), (worth(list(index)), list(index)))
+
+
+def test_every_unit_has_the_seed_and_the_columns_that_least_squares_choose():
+    rng = np.random.default_rng(11)
+    own, columns = rng.normal(size=(3, 200)), rng.normal(size=(12, 200))
+    columns[5] = columns[4] + 0.05 * columns[5]
+    y = [1.0, -2.0, 0.5] @ own + 6.0 * (columns[5] - columns[4]) + 0.4 * columns[7]
+    y += 0.3 * columns[8] - 0.3 * columns[10] + rng.normal(size=200)
+    index, trials = [np.array(each) for each in SEEDS], (1.0, 7.0, 20.0)
+    ends = ((0, 1), (1, 3), (3, 6))
+    units = [
+        Unit(Site(str(k), None), (None,) * (b - a), tuple(index[a:b]), trials[k])
+        for k, (a, b) in enumerate(ends)
+    ]
+    systems = SeedSystems.of(index, [columns[each] @ columns[each].T for each in index])
+    products = columns @ np.concatenate([own, y[None]]).T
+    systems = systems.given(own @ own.T, own @ y, y @ y, products)
+    by_hand = [grown_by_hand(own, columns, y, each) for each in SEEDS]
+    for open_to in (None, np.arange(6) != 4):
+        expected = []
+        for k, (a, b) in enumerate(ends):
+            seeds = [s for s in range(a, b) if open_to is None or open_to[s]]
+            s = max(seeds, key=lambda s: by_hand[s])
+            worth, chosen = by_hand[s]
+            expected.append((worth - np.log(trials[k]), str(k), s - a, chosen))
+        expected.sort(reverse=True)
+        found = ranking(systems, units, 200.0, open_to=open_to)
+        assert [(c.unit.site.effect, c.seed, sorted(c.columns)) for c in found] == [
+            each[1:] for each in expected
+        ]
+        np.testing.assert_allclose(
+            [c.log_bayes for c in found], [each[0] for each in expected], atol=1e-6
+        )
+        least = found[1].log_bayes
+        assert len(ranking(systems, units, 200.0, least, open_to=open_to)) == 1

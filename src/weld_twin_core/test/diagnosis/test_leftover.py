@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, multivariate_normal
 
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
-from weld_twin_core.diagnosis.predicting.leftover import Predicted, leftover
+from weld_twin_core.diagnosis.predicting.leftover import Predicted, _likelihood, leftover
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.reversals import just_turned
 
@@ -199,3 +199,24 @@ def test_neighbours_have_nothing_in_common_that_open_directions_account_for():
     bare = predicted(white(rng), rng)
     followed = replace(bare, own=np.full((1, COUNT, 6), NOISE))
     assert on_slides(followed) > 2.0 * on_slides(bare)
+
+
+def test_of_what_shows_one_way_alone_all_is_the_tools_beside_what_is_open():
+    rng = np.random.default_rng(9)
+    made = predicted(white(rng), rng, at_rest=True, ways=0.5 * NOISE)
+    faces = replace(made, seen=np.arange(6) < np.ones((COUNT, 1)))
+    found = told(faces, noise=None, rough=1.0)
+    left = (made.left[:, 0] ** 2).mean() - (0.5 * NOISE) ** 2
+    assert (found.position, found.orientation) == pytest.approx([np.sqrt(left)] * 2)
+    assert not found.gears.any() and not found.peaks.size
+
+
+def test_errors_are_as_likely_as_normal_laws_of_their_covariances_have_them():
+    rng = np.random.default_rng(10)
+    errors, root = rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 3))
+    covariances = root @ np.swapaxes(root, 1, 2)
+    each = [
+        multivariate_normal.logpdf(e, None, c) for e, c in zip(errors, covariances, strict=True)
+    ]
+    whole = sum(each) + 5 * 1.5 * np.log(2.0 * np.pi)
+    assert _likelihood(errors, covariances) == pytest.approx(whole)

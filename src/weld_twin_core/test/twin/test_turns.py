@@ -182,7 +182,7 @@ def test_what_a_cause_without_a_name_leaves_of_stations_is_no_noise():
     zero = effect_from_mapping(
         {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 0.0}
     )
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         made = fitted_to(robot, *loose(robot, rng, 40), zero, rng)
         joints, places = loose(robot, rng, 300)

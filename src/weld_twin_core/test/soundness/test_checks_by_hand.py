@@ -101,7 +101,7 @@ def test_joint_3_counted_against_the_ground_is_put_right_either_way(ur5, still):
         np.testing.assert_allclose(made.joints.q, still.joints.q, atol=1e-12)
 
 
-def test_joints_that_slide_are_told_in_lengths_and_turn_by_no_quarter():
+def test_joints_that_slide_are_told_in_lengths_and_turn_by_no_quarter(still):
     robot = load('ur5')
     track = replace(robot, prismatic=np.arange(robot.n) == 0)
     own = [s for s in suspicions(track) if s.at == (robot.joint_names[0],)]
@@ -109,6 +109,10 @@ def test_joints_that_slide_are_told_in_lengths_and_turn_by_no_quarter():
     assert any('millimetres' in s.sentence for s in own) and not any(
         'degrees' in s.sentence for s in own
     )
+    for each in suspicions(track):
+        if 'degrees' in each.sentence:  # of the joints that turn
+            (made,) = each.mend(Given((still,), track, FRAMES)).recordings
+            np.testing.assert_array_equal(made.joints.q[:, 0], still.joints.q[:, 0])
 
 
 def test_a_base_stands_turned_in_three_and_twenty_ways(ur5):

@@ -10,7 +10,7 @@ from diagnosis_cells import SIGMA
 
 from weld_twin_core.diagnosis.algebra.noise_floor import WIDEST, noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Problem
-from weld_twin_core.diagnosis.unseen.held_out_shrink import ratio_interval
+from weld_twin_core.diagnosis.unseen.held_out_shrink import Judged, _of_others, ratio_interval
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 
@@ -126,3 +126,15 @@ def test_two_stretches_still_give_an_interval():
     ratio, (low, high) = ratio_interval(np.full(50, 4.0), np.full(50, 1.0), np.arange(50) // 25)
     assert ratio == pytest.approx(0.5)
     assert 0.0 <= low < ratio < high
+
+
+@pytest.mark.parametrize('among', [0, 1, 8])
+def test_what_one_more_motion_shows_varies_about_what_all_show_besides_what_these_do(among):
+    judged = Judged((1.0, 0.5), 0.5, (0.4, 0.7), 8), Judged((1.0, 0.6), 0.6, (0.55, 0.8), 8)
+    low, high = _of_others(judged, among)
+    times = np.sqrt(1.0 + among)
+    assert np.log(0.5 / low) == pytest.approx(times * np.log(0.5 / 0.4))
+    ends = 0.5 * (0.7 / 0.5) ** times, 0.6 * (0.8 / 0.6) ** times
+    assert high == pytest.approx(max(ends))
+    # Nothing is left of a gap: the interval stays as it is.
+    assert _of_others([Judged((1.0, 0.0), 0.0, (0.0, 0.1), 8)], among) == (0.0, 0.1)

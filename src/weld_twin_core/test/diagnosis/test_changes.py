@@ -7,10 +7,16 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.fit import robust_scale
-from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.algebra.problem import Change, Problem
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.frames.changes import list_changes, list_undetectable, with_changes
+from weld_twin_core.diagnosis.frames.changes import (
+    _evidence,
+    _sure,
+    list_changes,
+    list_undetectable,
+    with_changes,
+)
 from weld_twin_core.effects import REGISTRY, Backlash, JointOffset, LinkTwist, ToolPose
 from weld_twin_core.errors import ModelError
 
@@ -129,3 +135,31 @@ def test_a_change_shows_once_the_play_that_hid_it_is_found(robot):
     (entry,) = found.as_dict()['changed']
     assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
     assert entry['value'] == pytest.approx(3e-4, abs=3e-5)
+
+
+@pytest.mark.parametrize('parts', [[], [1], [2], [1, 2]])
+def test_evidence_is_what_is_left_of_a_likelihood_once_all_values_are_summed_over(parts):
+    """On a grid of eight standard deviations about the middle, whatever is not fitted at zero."""
+    columns = np.random.default_rng(6).normal(size=(3, 9))
+    normal, right = columns @ columns.T, columns @ np.linspace(-2.0, 3.0, 9)
+    ridge = np.array([0.0, 0.5, 2.0])
+    normal += np.diag(ridge)
+    index = [0, *parts]
+    own = normal[np.ix_(index, index)]
+    middle, spread = np.linalg.solve(own, right[index]), np.sqrt(np.diag(np.linalg.inv(own)))
+    axes = [m + s * np.linspace(-8.0, 8.0, 81) for m, s in zip(middle, spread, strict=True)]
+    x = np.stack(np.meshgrid(*axes, indexing='ij')).reshape(len(index), -1)
+    likely = np.exp(right[index] @ x - 0.5 * (x * (own @ x)).sum(axis=0))
+    cell = np.prod([axis[1] - axis[0] for axis in axes])
+    believed = np.sqrt(ridge[parts] / (2.0 * np.pi)).prod() / np.sqrt(2.0 * np.pi)
+    told = _evidence(normal, right, ridge, np.array([0]), [np.array([k]) for k in parts])
+    assert told == pytest.approx(np.log(likely.sum() * cell * believed), abs=1e-6)
+
+
+@pytest.mark.parametrize(('times', 'sure'), [(2.95, False), (3.05, True)])
+def test_a_change_is_reported_from_three_standard_errors_of_all_its_numbers(times, sure):
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(6, 6))
+    way = root @ rng.choice([-1.0, 1.0], 6)  # one standard deviation along every axis
+    pose = ToolPose().fit.with_coordinates(1e-4 * times * way)
+    assert _sure(Change(1, pose), 1e-8 * root @ root.T) is sure

@@ -158,41 +158,42 @@ DRAWN = """
 """
 
 
+RECIPES = {
+    'an effect and its plant': (
+        {'core/effects/torch_sag': EFFECT, 'lab/plant/torch_neck': PLANT},
+        DIAGNOSED,
+        ('test/diagnosis', 'src/weld_twin_core/test', 'docs/_ext'),
+    ),
+    'a form of table': ({'msgs_py/tables/forms/vesper': FORM}, READ, ()),
+    'a section of the page': (
+        {'report/report/tally': SECTION},
+        DRAWN,
+        ('src/weld_twin_report/test/report', 'docs/_ext'),
+    ),
+}
+"""Files of each, by their places in the packages; what uses them, and which folders that needs."""
+
+
 @pytest.fixture(scope='module')
 def tree(tmp_path_factory):
-    """Return a copy of all packages, side by side."""
+    """Return a copy of all packages, side by side, with what Python compiled of them."""
     out = tmp_path_factory.mktemp('copy')
     for package in (ROOT / 'src').glob('weld_twin*'):
-        shutil.copytree(
-            package / package.name,
-            out / package.name,
-            ignore=shutil.ignore_patterns('__pycache__'),
-        )
+        shutil.copytree(package / package.name, out / package.name)
     return out
 
 
-def run(tree, code, *beside):
-    """Run code where the packages of a copy are found first, and some folders of this tree."""
+@pytest.mark.parametrize('name', RECIPES)
+def test_what_a_recipe_adds_is_a_file_each_and_is_used(name, tree):
+    files, code, beside = RECIPES[name]
+    if 'plant' in name:
+        pytest.importorskip('mujoco')
+    for place, text in files.items():
+        package, _, inside = place.partition('/')
+        (tree / f'weld_twin_{package}/{inside}.py').write_text(dedent(text), encoding='utf-8')
     places = [str(tree), *(str(ROOT / folder) for folder in beside)]
     start = f'import sys; sys.path[:0] = {places!r}\n'
     done = subprocess.run(
         [sys.executable, '-c', start + dedent(code)], capture_output=True, text=True, cwd=tree
     )
     assert done.returncode == 0, done.stderr[-3000:]
-
-
-def test_an_effect_and_its_plant_are_a_file_each_and_a_diagnosis_names_it(tree):
-    pytest.importorskip('mujoco')
-    (tree / 'weld_twin_core/effects/torch_sag.py').write_text(dedent(EFFECT), encoding='utf-8')
-    (tree / 'weld_twin_lab/plant/torch_neck.py').write_text(dedent(PLANT), encoding='utf-8')
-    run(tree, DIAGNOSED, 'test/diagnosis', 'src/weld_twin_core/test', 'docs/_ext')
-
-
-def test_a_form_of_table_is_a_file(tree):
-    (tree / 'weld_twin_msgs_py/tables/forms/vesper.py').write_text(dedent(FORM), encoding='utf-8')
-    run(tree, READ)
-
-
-def test_a_section_of_the_page_is_a_file(tree):
-    (tree / 'weld_twin_report/report/tally.py').write_text(dedent(SECTION), encoding='utf-8')
-    run(tree, DRAWN, 'src/weld_twin_report/test/report', 'docs/_ext')

@@ -4,11 +4,12 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
 import yaml
-from command_line import done, refused, weld_twin
+from command_line import done, refused
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
@@ -45,15 +46,13 @@ def offset(**keys):
     return [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3} | keys]
 
 
-@pytest.fixture
-def checks(tmp_path):
-    def check(name, data):
-        out = tmp_path / 'schema.json'
-        if not out.exists():
-            done('export', 'schema', name, '--out', out)
-        return jsonschema.Draft7Validator(json.loads(out.read_text())).is_valid(data)
+@cache
+def schema(name):
+    return json.loads(done('export', 'schema', name))
 
-    return check
+
+def checks(name, data):
+    return jsonschema.Draft7Validator(schema(name)).is_valid(data)
 
 
 def reads(name, data):
@@ -64,6 +63,8 @@ def reads(name, data):
     return True
 
 
+RIPPLE = {'effect': 'transmission_ripple', 'joint': 'elbow_joint'}
+RIPPLE |= {'amplitude': [1e-4], 'order': [2], 'phase': [0]}
 TIE = {'between': ['a', 'b'], 'value': 0.05}
 GOOD = [
     *(('robot', catalog.load(name).to_mapping()) for name in catalog.names()),
@@ -71,18 +72,7 @@ GOOD = [
     ('robot', joint() | {'plausible': {'backlash': {'width': {'high': 1e-3}}}}),
     ('effects', []),
     ('effects', offset()),
-    (
-        'effects',
-        [
-            {
-                'effect': 'transmission_ripple',
-                'joint': 'elbow_joint',
-                'amplitude': [1e-4],
-                'order': [2],
-                'phase': [0],
-            }
-        ],
-    ),
+    ('effects', [RIPPLE]),
     ('seam', LINE),
     ('seam', LINE | {'torch': {'work': 0.1, 'heading': 'seam'}}),
     ('seam', LINE | {'weave': {'amplitude': 0.002, 'wavelength': 0.01}}),
@@ -112,18 +102,18 @@ BAD = [
 
 
 @pytest.mark.parametrize(('name', 'data'), GOOD, ids=lambda v: v if isinstance(v, str) else '')
-def test_what_is_read_is_taken(checks, name, data):
+def test_what_is_read_is_taken(name, data):
     assert reads(name, data)
     assert checks(name, data)
 
 
 @pytest.mark.parametrize(('name', 'data'), BAD, ids=lambda v: v if isinstance(v, str) else '')
-def test_what_is_refused_is_refused(checks, name, data):
+def test_what_is_refused_is_refused(name, data):
     assert not reads(name, data)
     assert not checks(name, data)
 
 
-def test_every_effect_of_the_documentation_is_taken(checks):
+def test_every_effect_of_the_documentation_is_taken():
     text = (DOCS / 'effects.md').read_text(encoding='utf-8')
     lists = [yaml.safe_load(block) for block in re.findall(r'```yaml\n(- .*?)```', text, re.S)]
     assert lists
@@ -132,12 +122,12 @@ def test_every_effect_of_the_documentation_is_taken(checks):
 
 
 def test_every_effect_has_its_own_part():
-    made = json.loads(weld_twin('export', 'schema', 'effects').out)
-    assert {part['title'] for part in made['items']['oneOf']} == set(REGISTRY)
+    titles = {part['title'] for part in schema('effects')['items']['oneOf']}
+    assert titles == set(REGISTRY)
 
 
 def test_a_robot_file_has_the_keys_that_its_reader_knows():
-    made = json.loads(weld_twin('export', 'schema', 'robot').out)
+    made = schema('robot')
     for data, keys in (
         ({'joints': [], 'zzz': 1}, made['properties']),
         (joint(zzz=1), made['properties']['joints']['items']['properties']),

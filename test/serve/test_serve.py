@@ -83,7 +83,7 @@ def browser_of(chromium, folder):
 
 
 def test_from_drop_to_sheet_and_into_a_history_of_ones_own(week, chromium, tmp_path):
-    """A week: dropped, closed, come back, compared; a full disk, a restart, two people."""
+    """A week: dropped, closed, come back, compared; a full disk, a kill and a restart, two people."""
     with browser_of(chromium, tmp_path / 'mine') as page:
         address = monday(page, week)
         assert page.evaluate('document.cookie') == ''  # no script reads a key
@@ -92,8 +92,8 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(week, chromium, tmp_p
         the_history_grows(page, week)
         page.goto(week.root + '/recordings')
         assert page.locator('#mine tbody tr').count() == 2
-        if not week.no_disk:
-            wednesday(page, week)
+        failed = None if week.no_disk else wednesday(page, week)
+        thursday(page, week, address, failed)
     other = chromium.new_context()
     theirs = other.new_page()
     # Nobody else sees any of it, with its address either.
@@ -104,6 +104,8 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(week, chromium, tmp_p
     assert 'Nothing yet' in theirs.locator('#message').inner_text()
     friday(theirs, week, key)
     other.close()
+    week.kill()
+    after(lambda: not any(str(week.disk).encode() in _command(pid) for pid in os.listdir('/proc')))
 
 
 def monday(page, week):
@@ -137,27 +139,47 @@ def keys_page(page, week):
     return page.locator('#own').inner_text()
 
 
-def wednesday(page, week):
-    """The disk is full while a recording is in work, and when another one comes; then it is not."""
+def dropped(page, week):
+    """Drop the recording; return the address it has while it waits."""
     page.goto(week.root)
     page.set_input_files('#files', bag_files())
     page.select_option('#robot', 'ur5')
     page.get_by_role('button', name='Diagnose').click()
     page.wait_for_url('**/recordings/*')
-    ballast, failed = fill(week.disk), page.url.removeprefix(week.root)
+    return page.url.removeprefix(week.root)
+
+
+def wednesday(page, week):
+    """The disk is full while a recording is in work, and when another one comes; return the first."""
+    failed = dropped(page, week)
+    ballast = fill(week.disk)
     assert 'disk of the server is full' in until(page, '#refused').inner_text()
     page.goto(week.root)
     page.set_input_files('#files', bag_files())
     page.get_by_role('button', name='Diagnose').click()
     assert 'disk of the server is full' in until(page, '#message').inner_text()
     ballast.unlink()
+    return failed
+
+
+def thursday(page, week, address, failed):
+    """A kill loses no verdict, and what waited, or had no room, goes on."""
+    waiting = dropped(page, week)
+    verdict = week.disk / 'jobs' / address.rpartition('/')[2] / 'found/diagnosis.json'
+    before = verdict.stat().st_mtime_ns
     week.kill()
     week.start()
-    page.goto(week.root + failed)
-    # The restart took it up again by itself, unless its end was written in time.
-    if until(page, 'iframe, #refused').first.get_attribute('id') == 'refused':
-        page.get_by_role('button', name='Try again').click()
+    page.goto(week.root + address)
+    assert page.locator('iframe').count() == 1
+    assert verdict.stat().st_mtime_ns == before
+    page.goto(week.root + waiting)
     until(page, 'iframe')
+    if failed:
+        page.goto(week.root + failed)
+        # The restart took it up again by itself, unless its end was written in time.
+        if until(page, 'iframe, #refused').first.get_attribute('id') == 'refused':
+            page.get_by_role('button', name='Try again').click()
+        until(page, 'iframe')
 
 
 def friday(page, week, key):
@@ -331,38 +353,6 @@ def after(true, seconds=60.0):
     while not true():
         assert time.monotonic() < until
         time.sleep(0.02)
-
-
-def test_a_kill_loses_no_verdict_and_what_waited_goes_on(tmp_path, chromium):
-    made = Server(tmp_path)
-    try:
-        context = chromium.new_context()
-        page = context.new_page()
-        page.goto(made.address)
-        addresses = []
-        for _ in range(2):
-            page.goto(made.root)
-            page.set_input_files('#files', bag_files())
-            page.select_option('#robot', 'ur5')
-            page.get_by_role('button', name='Diagnose').click()
-            page.wait_for_url('**/recordings/*')
-            addresses.append(page.url.removeprefix(made.root))
-        page.goto(made.root + addresses[0])
-        until(page, 'iframe')
-        made.kill()
-        first = tmp_path / 'jobs' / addresses[0].rsplit('/', 1)[-1]
-        before = (first / 'found/diagnosis.json').stat().st_mtime_ns
-        made.start()
-        page.goto(made.root + addresses[0])
-        assert page.locator('iframe').count() == 1
-        assert (first / 'found/diagnosis.json').stat().st_mtime_ns == before
-        page.goto(made.root + addresses[1])
-        until(page, 'iframe')
-        context.close()
-    finally:
-        made.kill()
-    after(lambda: not any(str(tmp_path).encode() in _command(pid) for pid in os.listdir('/proc')))
-    shutil.rmtree(tmp_path)
 
 
 def _command(pid):

@@ -20,6 +20,7 @@ ROBOT = load('ur5')
 N = 12
 RNG = np.random.default_rng(3)
 Q = np.linspace(0.1, 0.6, N)[:, None] + RNG.uniform(-1.0, 1.0, 6)
+TOOL = forward(ROBOT, Q)[:, :3, 3]
 STATE = """\
 std_msgs/Header header
 string[] joint_names
@@ -100,36 +101,43 @@ class Cell:
         stamp = self.make('builtin_interfaces/msg/Time', sec=k // 10 + 1, nanosec=k % 10 * 10**8)
         return self.make('std_msgs/msg/Header', stamp=stamp, frame_id=frame)
 
-    def add(self, topic, kind, k, **fields):
+    def add(self, topic, kind, k, frame='', **fields):
+        fields = fields if 'transforms' in fields else {'header': self.header(k, frame), **fields}
         self.rows.append((topic, kind, k, self.make(kind, **fields)))
 
-    def joints(self, k, prefixes=('',), topic='/joint_states'):
-        self.add(
-            topic,
-            'sensor_msgs/msg/JointState',
-            k,
-            header=self.header(k),
-            name=[prefix + name for prefix in prefixes for name in ROBOT.joint_names],
-            position=np.tile(Q[k], len(prefixes)),
-            velocity=np.array([]),
-            effort=np.array([]),
+    def joints(self, k, names=ROBOT.joint_names, q=None):
+        none, q = np.array([]), Q[k] if q is None else q
+        told = {'name': list(names), 'position': q, 'velocity': none, 'effort': none}
+        self.add('/joint_states', 'sensor_msgs/msg/JointState', k, **told)
+
+    def state(self, k, names, reference, feedback):
+        """Add what a controller tells of its command and of what came of it."""
+
+        def point(q):
+            none = np.array([])
+            now = self.make('builtin_interfaces/msg/Duration', sec=0, nanosec=0)
+            told = {'positions': q, 'velocities': np.zeros(6), 'accelerations': none}
+            kind = 'trajectory_msgs/msg/JointTrajectoryPoint'
+            return self.make(kind, **told, effort=none, time_from_start=now)
+
+        told = {'joint_names': names, 'reference': point(reference), 'feedback': point(feedback)}
+        kind = 'control_msgs/msg/JointTrajectoryControllerState'
+        self.add('/controller/state', kind, k, **told)
+
+    def placed(self, pose, kind, place, turn):
+        """Return a pose as a message of a kind, of two messages under these names."""
+        where = 'Vector3' if place == 'translation' else 'Point'
+        where = self.make(
+            f'geometry_msgs/msg/{where}', **dict(zip('xyz', pose[:3, 3], strict=True))
         )
+        q = dict(zip('xyzw', quaternion_from_matrix(pose[:3, :3]), strict=True))
+        turned = self.make('geometry_msgs/msg/Quaternion', **q)
+        return self.make(f'geometry_msgs/msg/{kind}', **{place: where, turn: turned})
 
     def transform(self, k, child='probe'):
-        pose = forward(ROBOT, Q[k])
-        x, y, z, w = quaternion_from_matrix(pose[:3, :3])
-        return self.make(
-            'geometry_msgs/msg/TransformStamped',
-            header=self.header(k, 'tracker'),
-            child_frame_id=child,
-            transform=self.make(
-                'geometry_msgs/msg/Transform',
-                translation=self.make(
-                    'geometry_msgs/msg/Vector3', **dict(zip('xyz', pose[:3, 3], strict=True))
-                ),
-                rotation=self.make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w),
-            ),
-        )
+        pose = self.placed(forward(ROBOT, Q[k]), 'Transform', 'translation', 'rotation')
+        told = {'header': self.header(k, 'tracker'), 'child_frame_id': child, 'transform': pose}
+        return self.make('geometry_msgs/msg/TransformStamped', **told)
 
     def write(self, folder):
         with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
@@ -146,15 +154,9 @@ def cell():
     return Cell()
 
 
-def tool(k):
-    return forward(ROBOT, Q[k])[:3, 3]
-
-
 def assert_read(recording):
     np.testing.assert_allclose(recording.joints.q, Q, atol=1e-15)
-    np.testing.assert_allclose(
-        recording.measured.position, [tool(k) for k in range(N)], atol=1e-12
-    )
+    np.testing.assert_allclose(recording.measured.position, TOOL, atol=1e-12)
 
 
 def test_transforms_of_one_topic_are_measured_poses(cell, tmp_path):
@@ -178,27 +180,15 @@ def test_one_frame_of_tf_is_the_measured_pose(cell, tmp_path):
 
 def test_one_rigid_body_of_a_motion_capture_system_is_the_measured_pose(cell, tmp_path):
     def body(k, name, pose):
-        x, y, z, w = quaternion_from_matrix(pose[:3, :3])
-        return cell.make(
-            'mocap4r2_msgs/msg/RigidBody',
-            header=cell.header(k),
-            frame_number=k,
-            rigid_body_name=name,
-            markers=[],
-            pose=cell.make(
-                'geometry_msgs/msg/Pose',
-                position=cell.make(
-                    'geometry_msgs/msg/Point', **dict(zip('xyz', pose[:3, 3], strict=True))
-                ),
-                orientation=cell.make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w),
-            ),
-        )
+        pose = cell.placed(pose, 'Pose', 'position', 'orientation')
+        told = {'header': cell.header(k), 'frame_number': k, 'rigid_body_name': name, 'pose': pose}
+        return cell.make('mocap4r2_msgs/msg/RigidBody', **told, markers=[])
 
     for k in range(N):
         cell.joints(k)
         seen = [body(k, 'table', np.eye(4)), body(k, 'torch', forward(ROBOT, Q[k]))]
-        message = {'header': cell.header(k, 'mocap'), 'frame_number': k, 'rigidbodies': seen}
-        cell.add('/rigid_bodies', 'mocap4r2_msgs/msg/RigidBodies', k, **message)
+        kind = 'mocap4r2_msgs/msg/RigidBodies'
+        cell.add('/rigid_bodies', kind, k, 'mocap', frame_number=k, rigidbodies=seen)
     bag = cell.write(tmp_path)
     names = TopicNames(pose='/rigid_bodies:torch')
     assert_read(read_recording(bag, ROBOT, names))
@@ -210,28 +200,9 @@ def test_one_rigid_body_of_a_motion_capture_system_is_the_measured_pose(cell, tm
         read_recording(bag, ROBOT, TopicNames(pose='/rigid_bodies'))
 
 
-def point(cell, q):
-    return cell.make(
-        'trajectory_msgs/msg/JointTrajectoryPoint',
-        positions=q,
-        velocities=np.zeros(6),
-        accelerations=np.array([]),
-        effort=np.array([]),
-        time_from_start=cell.make('builtin_interfaces/msg/Duration', sec=0, nanosec=0),
-    )
-
-
 def test_the_reference_of_a_controller_is_the_commanded_motion(cell, tmp_path):
     for k in range(N):
-        cell.add(
-            '/controller/state',
-            'control_msgs/msg/JointTrajectoryControllerState',
-            k,
-            header=cell.header(k),
-            joint_names=list(ROBOT.joint_names),
-            reference=point(cell, Q[k]),
-            feedback=point(cell, Q[k] + 1e-3),
-        )
+        cell.state(k, list(ROBOT.joint_names), Q[k], Q[k] + 1e-3)
     bag = cell.write(tmp_path)
     for part, off in (('', 0.0), (':reference', 0.0), (':feedback', 1e-3)):
         names = TopicNames(joints=f'/controller/state{part}')
@@ -242,24 +213,15 @@ def test_the_reference_of_a_controller_is_the_commanded_motion(cell, tmp_path):
 
 def test_what_a_controller_feeds_back_is_measured_against_what_it_commanded(cell, tmp_path):
     """The servo's own gap: one topic tells of both, and no tracker is there."""
+    turned = [f'left_{name}' for name in reversed(ROBOT.joint_names)]
     for k in range(N):
-        cell.add(
-            '/controller/state',
-            'control_msgs/msg/JointTrajectoryControllerState',
-            k,
-            header=cell.header(k),
-            joint_names=[f'left_{name}' for name in reversed(ROBOT.joint_names)],
-            reference=point(cell, np.flip(Q[k]).copy() - 2e-3),
-            feedback=point(cell, np.flip(Q[k]).copy()),
-        )
+        cell.state(k, turned, np.flip(Q[k]) - 2e-3, np.flip(Q[k]).copy())
     names = TopicNames(joints='/controller/state', pose='/controller/state')
     bag = cell.write(tmp_path)
     assert bag_info(bag, names).usable
     recording = read_recording(bag, ROBOT, names)
     np.testing.assert_allclose(recording.joints.q, Q - 2e-3, atol=1e-15)
-    np.testing.assert_allclose(
-        recording.measured.position, [tool(k) for k in range(N)], atol=1e-12
-    )
+    np.testing.assert_allclose(recording.measured.position, TOOL, atol=1e-12)
 
 
 def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
@@ -270,22 +232,21 @@ def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
             for q in Q[k]
         ]
         other = cell.make(value, interface_names=['force'], values=np.array([1.0]))
-        cell.add(
-            '/dynamic_joint_states',
-            'control_msgs/msg/DynamicJointState',
-            k,
-            header=cell.header(k),
-            joint_names=['wrench_sensor', *ROBOT.joint_names],
-            interface_values=[other, *each],
-        )
+        told = {'joint_names': ['wrench_sensor', *ROBOT.joint_names]}
+        told['interface_values'] = [other, *each]
+        cell.add('/dynamic_joint_states', 'control_msgs/msg/DynamicJointState', k, **told)
     bag, names = cell.write(tmp_path), TopicNames(joints='/dynamic_joint_states')
     np.testing.assert_allclose(read_recording(bag, ROBOT, names).joints.q, Q)
     assert 'joint states' not in ' '.join(bag_info(bag, names).missing)
 
 
+def prefixed(prefix):
+    return [prefix + name for name in ROBOT.joint_names]
+
+
 def test_a_prefix_of_all_joints_is_taken_off_and_told(cell, tmp_path):
     for k in range(N):
-        cell.joints(k, ('left_',))
+        cell.joints(k, prefixed('left_'))
     recording = read_recording(cell.write(tmp_path), ROBOT)
     np.testing.assert_allclose(recording.joints.q, Q)
     assert "named with the prefix 'left_'" in ' '.join(recording.notes)
@@ -293,17 +254,9 @@ def test_a_prefix_of_all_joints_is_taken_off_and_told(cell, tmp_path):
 
 def test_one_of_two_robots_on_a_topic_is_read_by_its_prefix_and_a_map_of_names(cell, tmp_path):
     called = dict(zip(ROBOT.joint_names, 'ABCDEF', strict=True))
+    both = [*(f'left/{name}' for name in 'ABCDEF'), *(f'right/{name}' for name in 'FEDCBA')]
     for k in range(N):
-        cell.add(
-            '/joint_states',
-            'sensor_msgs/msg/JointState',
-            k,
-            header=cell.header(k),
-            name=[*(f'left/{name}' for name in 'ABCDEF'), *(f'right/{name}' for name in 'FEDCBA')],
-            position=np.concatenate([Q[k] + 1.0, np.flip(Q[k])]),
-            velocity=np.array([]),
-            effort=np.array([]),
-        )
+        cell.joints(k, both, np.concatenate([Q[k] + 1.0, np.flip(Q[k])]))
     names = TopicNames(joint_prefix='right/', joint_map=tuple(called.items()))
     recording = read_recording(cell.write(tmp_path), ROBOT, names)
     np.testing.assert_allclose(recording.joints.q, Q, atol=1e-15)
@@ -313,7 +266,7 @@ def test_one_of_two_robots_on_a_topic_is_read_by_its_prefix_and_a_map_of_names(c
 
 def test_two_robots_on_one_topic_are_not_mixed(cell, tmp_path):
     for k in range(N):
-        cell.joints(k, ('left_', 'right_'))
+        cell.joints(k, prefixed('left_') + prefixed('right_'), np.tile(Q[k], 2))
     with pytest.raises(DataError, match="prefixes 'left_', 'right_'"):
         read_recording(cell.write(tmp_path), ROBOT)
 
@@ -359,7 +312,7 @@ def test_tags_that_a_camera_found_tell_poses(tmp_path):
         tags = {**MIDDLES, 99: (0.3, 0.0, 0.0)}.items()
         found = [detection(cell, tag, middle, board) for tag, middle in tags]
         kind = 'apriltag_msgs/msg/AprilTagDetectionArray'
-        cell.add('/detections', kind, k, header=cell.header(k, 'eye'), detections=found)
+        cell.add('/detections', kind, k, 'eye', detections=found)
     (tmp_path / 'tags.yaml').write_text(
         f'board: tags\nsize: {SIDE}\ntags: {{7: [0, 0, 0], 11: [0.1, 0.02, 0]}}\n'
     )

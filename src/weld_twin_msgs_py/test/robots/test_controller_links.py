@@ -100,38 +100,16 @@ def test_the_flange_beside_the_way_to_the_tip_is_found_and_another_can_be_asked_
         load_robot(tmp_path / 'r.urdf', tip_link='tcp', flange_link='c')
 
 
+BESIDE = ('base_link', 'base', '0 0 0.4', '0 0 3')
+ON_A_STAND = ('base', 'base_link', '0 0 1', '0 0 1')
+IN_A_WORLD = ('world', 'base_link', '1 0 2', '3.1415927 0 0')
 BASES = {
     # what hangs where, the root of the arm, what is asked for: what the base is
-    'base beside base_link': (
-        'base',
-        'base_link',
-        None,
-        ('base_link', 'base', '0 0 0.4', '0 0 3'),
-    ),
-    'base_link asked for': (
-        'base_link',
-        'base_link',
-        'base_link',
-        ('base_link', 'base', '0 0 0.4', '0 0 3'),
-    ),
-    'a turned base link in a world': (
-        'base_link',
-        'base_link',
-        None,
-        ('world', 'base_link', '1 0 2', '3.1415927 0 0'),
-    ),
-    'a world asked for': (
-        'world',
-        'base_link',
-        'world',
-        ('world', 'base_link', '1 0 2', '3.1415927 0 0'),
-    ),
-    'a stand called base': (
-        'base_link',
-        'base_link',
-        None,
-        ('base', 'base_link', '0 0 1', '0 0 1'),
-    ),
+    'base beside base_link': ('base', 'base_link', None, BESIDE),
+    'base_link asked for': ('base_link', 'base_link', 'base_link', BESIDE),
+    'a turned base link in a world': ('base_link', 'base_link', None, IN_A_WORLD),
+    'a world asked for': ('world', 'base_link', 'world', IN_A_WORLD),
+    'a stand called base': ('base_link', 'base_link', None, ON_A_STAND),
     'no usual name': ('link_0', 'link_0', None, ('world', 'link_0', '0 0 1', '0 1 0')),
 }
 

@@ -54,14 +54,26 @@ def flange(q, zeros):
     return out
 
 
-def robot_file(folder):
-    joints = [
-        dict(zip(('theta_offset', 'd', 'a', 'alpha'), map(float, row), strict=True), name=name)
-        for name, row in zip(NAMES, ROWS, strict=True)
+def joints_called(names):
+    """Return the arm's joints as a robot file has them."""
+    keys = ('theta_offset', 'd', 'a', 'alpha')
+    return [
+        dict(zip(keys, map(float, row), strict=True), name=name)
+        for name, row in zip(names, ROWS, strict=True)
     ]
+
+
+def robot_file(folder):
     path = folder / 'arm.yaml'
-    path.write_text(yaml.safe_dump({'name': 'arm', 'convention': 'standard', 'joints': joints}))
+    arm = {'name': 'arm', 'convention': 'standard', 'joints': joints_called(NAMES)}
+    path.write_text(yaml.safe_dump(arm))
     return path
+
+
+def found_in(out, *words):
+    """Diagnose, whatever it comes to, and return the answer."""
+    weld_twin('diagnose', *words, '--out', out)
+    return json.loads((out / 'diagnosis.json').read_text())
 
 
 def board_bag(path, kind, q, poses, covariance):
@@ -98,10 +110,8 @@ def test_a_board_counts_less_along_the_line_of_sight(tmp_path):
     robot, off = robot_file(tmp_path), {}
     for kind in ('plain', 'sure'):
         board_bag(tmp_path / kind, kind, q, board, covariance)
-        out = tmp_path / f'{kind} out'
-        words = ('diagnose', tmp_path / kind, '--robot', robot, '--align', 'base,tool')
-        weld_twin(*words, *FEW, '--out', out)
-        found = json.loads((out / 'diagnosis.json').read_text())
+        words = (tmp_path / kind, '--robot', robot, '--align', 'base,tool', *FEW)
+        found = found_in(tmp_path / f'{kind} out', *words)
         told = {(e['effect'], e['joint']): e for e in found['verdict']['effects']}
         one = told.get(('joint_offset', 'axis_3'))
         off[kind] = 1.0 if one is None else abs(one['parameters']['offset'] - 6e-4)
@@ -170,16 +180,10 @@ def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, told=1.0, cou
                     angles = (f'{value:.7f}' for value in q[k])
                     lines.append(','.join((str(k), own, str(at), f'{u:.3f}', f'{v:.3f}', *angles)))
         fx, fy, cx, cy = numbers
-        info = {
-            'camera_name': name,
-            'camera_matrix': {
-                'rows': 3,
-                'cols': 3,
-                'data': [fx * told, 0.0, cx, 0.0, fy * told, cy, 0.0, 0.0, 1.0],
-            },
-            'distortion_model': 'plumb_bob',
-            'distortion_coefficients': {'rows': 1, 'cols': 5, 'data': list(bent)},
-        }
+        matrix = [fx * told, 0.0, cx, 0.0, fy * told, cy, 0.0, 0.0, 1.0]
+        info = {'camera_name': name, 'distortion_model': 'plumb_bob'}
+        info['camera_matrix'] = {'rows': 3, 'cols': 3, 'data': matrix}
+        info['distortion_coefficients'] = {'rows': 1, 'cols': 5, 'data': list(bent)}
         (folder / f'{name}.yaml').write_text(yaml.safe_dump(info))
     (folder / 'board.yaml').write_text(yaml.safe_dump(BOARD))
     (folder / 'pixels.csv').write_text('\n'.join(lines) + '\n')
@@ -194,27 +198,12 @@ def described(folder):
     ]
 
 
-def diagnosed(folder, robot):
-    """Return what `import` says of the pixels, and the diagnosis."""
-    said = weld_twin(
-        'import',
-        folder / 'pixels.csv',
-        '--robot',
-        robot,
-        *described(folder),
-        '--out',
-        folder / 'bag',
-    ).out
-    weld_twin(
-        *('diagnose', folder / 'bag', '--robot', robot, '--align', 'base,tool'),
-        *(*OTHERS, '--out', folder / 'out'),
-    )
-    return said, json.loads((folder / 'out' / 'diagnosis.json').read_text())
-
-
 def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path):
-    robot = cell(tmp_path, zeros=np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]))
-    said, found = diagnosed(tmp_path, robot)
+    robot, bag = cell(tmp_path, zeros=np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])), tmp_path / 'bag'
+    words = ('import', tmp_path / 'pixels.csv', '--robot', robot, *described(tmp_path))
+    said = weld_twin(*words, '--out', bag).out
+    words = ('--robot', robot, '--align', 'base,tool', *OTHERS)
+    found = found_in(tmp_path / 'out', bag, *words)
     assert '40 of 40 images tell a pose; points are found within 0.1' in said
     named = [(e['effect'], e['joint']) for e in found['verdict']['effects']]
     assert named == [('joint_offset', 'axis_3')]
@@ -233,11 +222,8 @@ def test_mistakes_with_cameras_are_named_from_a_table_of_pixels_alone(tmp_path):
         folder = tmp_path / kind
         folder.mkdir()
         robot = cell(folder, zeros=zeros, count=16, **mistake)
-        weld_twin(
-            *('diagnose', folder / 'pixels.csv', '--robot', robot, *described(folder)),
-            *('--align', 'base,tool', *OTHERS, '--out', folder / 'out'),
-        )
-        found = json.loads((folder / 'out' / 'diagnosis.json').read_text())
+        words = (folder / 'pixels.csv', '--robot', robot, *described(folder))
+        found = found_in(folder / 'out', *words, '--align', 'base,tool', *OTHERS)
         assert found['verdict']['status'] == 'unsound'
         assert [entry['kind'] for entry in found['unsound']] == [kind]
 
@@ -283,23 +269,14 @@ def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path)
     names = [f'{side}{k}' for side in 'lr' for k in range(1, 7)]
     lines = [','.join(names), *(','.join(f'{value:.7f}' for value in row) for row in q)]
     (tmp_path / 'grips.csv').write_text('\n'.join(lines) + '\n')
-    keys = ('theta_offset', 'd', 'a', 'alpha')
-    each = {
-        side: [
-            dict(zip(keys, map(float, row), strict=True), name=f'{side}{k + 1}')
-            for k, row in enumerate(ROWS)
-        ]
-        for side in 'lr'
-    }
     foot = {'xyz': FOOT[:3, 3].tolist(), 'quat_xyzw': [0.0, 0.0, 1.0, 0.0]}
-    pair = {'name': 'pair', 'joints': each['r']}
-    pair['workpiece'] = {'base': foot, 'joints': each['l']}
+    pair = {'name': 'pair', 'joints': joints_called(names[6:])}
+    pair['workpiece'] = {'base': foot, 'joints': joints_called(names[:6])}
     (tmp_path / 'pair.yaml').write_text(yaml.safe_dump(pair))
-    robot, bag, out = ('--robot', tmp_path / 'pair.yaml'), tmp_path / 'bag', tmp_path / 'out'
+    robot, bag = ('--robot', tmp_path / 'pair.yaml'), tmp_path / 'bag'
     said = weld_twin('import', tmp_path / 'grips.csv', '--clamped', *robot, '--out', bag).out
     assert '40 postures with one bar clamped at both ends' in said
-    weld_twin('diagnose', bag, *robot, '--align', 'tool', *OTHERS, '--out', out)
-    found = json.loads((out / 'diagnosis.json').read_text())['verdict']
+    found = found_in(tmp_path / 'out', bag, *robot, '--align', 'tool', *OTHERS)['verdict']
     assert found['status'] in ('identified', 'ambiguous')
     (one,) = [e for e in found['effects'] if (e['effect'], e['joint']) == ('joint_offset', 'l3')]
     assert one['parameters']['offset'] == pytest.approx(OFF, abs=5e-5)

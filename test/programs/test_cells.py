@@ -118,9 +118,7 @@ def axes(q):
 
 
 def krl(arm):
-    tool = stood(FRAMES['tool'])
-    sets = kuka(tool)
-    rows = ['DEF cell( )', 'BAS (#INITMOV,0 )', f'$TOOL = {{{sets}}}']
+    rows = ['DEF cell( )', 'BAS (#INITMOV,0 )', f'$TOOL = {{{kuka(stood(FRAMES["tool"]))}}}']
     xyz, abc = OBJECT
     frame = ','.join(f'{n} {v}' for n, v in zip('XYZABC', xyz + abc, strict=True))
     own = ','.join(f'A{k + 1} {v:.6f}' for k, v in enumerate(np.degrees(POSTURES[0, 3:])))
@@ -134,9 +132,8 @@ def krl(arm):
 
 def kuka(pose):
     turn = Rotation.from_matrix(pose[:3, :3]).as_euler('ZYX', degrees=True)
-    return ','.join(
-        f'{n} {v:.6f}' for n, v in zip('XYZABC', [*pose[:3, 3] * 1e3, *turn], strict=True)
-    )
+    values = zip('XYZABC', [*pose[:3, 3] * 1e3, *turn], strict=True)
+    return ','.join(f'{n} {v:.6f}' for n, v in values)
 
 
 def kuka_axes(q):
@@ -229,17 +226,16 @@ def cell(tmp_path, arm):
 
 def corrected(cell, language, text, *more):
     (cell / NAMES[language]).write_text(text, encoding='utf-8')
-    words = ['correct', cell / NAMES[language], '--robot', cell / 'cell.yaml']
-    words += [
-        '--model',
-        cell / 'found.yaml',
+    words = (
+        'correct',
+        cell / NAMES[language],
+        '--robot',
+        cell / 'cell.yaml',
         '--out',
         cell / 'out',
-        '--max-correction',
-        '6mm',
-        '1deg',
-    ]
-    return weld_twin(*map(str, words), *more)
+    )
+    words += ('--model', cell / 'found.yaml', '--max-correction', '6mm', '1deg')
+    return weld_twin(*words, *more)
 
 
 @pytest.mark.parametrize('language', WRITE)
@@ -262,81 +258,34 @@ def test_a_corrected_program_takes_the_real_tool_to_the_place_on_the_real_workpi
         np.testing.assert_allclose(there[:3, 3], wanted[:3, 3], atol=4e-6)
         np.testing.assert_allclose(there[:3, :3], wanted[:3, :3], atol=4e-6)
     entry = json.loads((cell / 'out' / 'correction.json').read_text(encoding='utf-8'))
-    assert any(
-        'is -tilt' in note and 'compare them with the pendant' in note for note in entry['notes']
-    )
+    (note,) = [note for note in entry['notes'] if 'is -tilt' in note]
+    assert 'compare them with the pendant' in note
     # Nothing but digits of points differs.
     after = re.sub(r'[^\n]*corrected by weld_twin[^\n]*\n', '', after)
     assert re.sub(r'[-\d.]', '', after) == re.sub(r'[-\d.]', '', text)
 
 
-def swung(text):
-    """Let the base stand still while the table turns."""
-    return re.sub(r'\$BASE = EK.*', '$BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}', text)
-
-
+KNOWN = ('--external', '')
+"""The option that tells the axes as they are called."""
+STANDS = (r'\$BASE = EK.*', '$BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}')
+"""What lets the base stand still while the table turns."""
+ALONG = 'the positioner moves while the tool goes straight in a frame that stands still'
+SECOND = (
+    'PERS wobjdata w:=[FALSE,FALSE,"STN2",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\nPROC main'
+)
 OPEN = [
-    (
-        'krl',
-        (),
-        lambda t: t,
-        'say which external axes of the controller the joints turn, tilt, rail',
-    ),
-    ('krl', ('--external', 'E1=rail,E2=tilt'), lambda t: t, 'must tell each of the joints turn'),
-    ('krl', ('--external', 'E1=rail,E2=tilt,E2=turn'), lambda t: t, 'a name of its own'),
-    ('krl', ('--external', 'eax_a=rail'), lambda t: t, '--external needs NAME=joint'),
-    (
-        'krl',
-        ('--external', EXTERNAL['krl']),
-        lambda t: re.sub(r'(LIN.*),E2 [-.\d]+', r'\1', t),
-        'does not say where the external axes stand',
-    ),
-    (
-        'krl',
-        ('--external', EXTERNAL['krl']),
-        lambda t: re.sub(r'\$BASE = EK.*', 'BAS(#BASE,17)', t),
-        'whether base 17 goes along with the positioner is not in the program',
-    ),
-    (
-        'krl',
-        ('--external', EXTERNAL['krl']),
-        swung,
-        'where the track begins in it is not known; say it with --world',
-    ),
-    (
-        'krl',
-        ('--external', EXTERNAL['krl'], '--world', '0,0,0,0,0,0'),
-        swung,
-        'the positioner moves while the tool goes straight in a frame that stands still',
-    ),
-    (
-        'krl',
-        ('--external', EXTERNAL['krl']),
-        lambda t: re.sub('E4 0.0', 'E4 1.0', t),
-        'moves external axes',
-    ),
-    (
-        'rapid',
-        ('--external', EXTERNAL['rapid']),
-        lambda t: t.replace(
-            'PROC',
-            'PERS wobjdata w:=[FALSE,FALSE,"STN2",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\nPROC',
-            1,
-        ),
-        'go along with STN1 and STN2, and a robot file has one positioner',
-    ),
-    (
-        'fanuc-ls',
-        ('--external', EXTERNAL['fanuc-ls']),
-        lambda t: t.replace(' COORD', ''),
-        'the positioner moves while the tool goes straight in a frame that stands still',
-    ),
-    (
-        'fanuc-ls',
-        ('--external', EXTERNAL['fanuc-ls']),
-        lambda t: re.sub(r'J(\d) = (\S+) deg, (?=.*E1)', r'\2 ', t),
-        'needs X Y Z W P R, or J1',
-    ),
+    ('krl', (), None, 'say which external axes of the controller the joints turn, tilt, rail'),
+    ('krl', ('--external', 'E1=rail,E2=tilt'), None, 'must tell each of the joints turn'),
+    ('krl', ('--external', 'E1=rail,E2=tilt,E2=turn'), None, 'a name of its own'),
+    ('krl', ('--external', 'eax_a=rail'), None, '--external needs NAME=joint'),
+    ('krl', KNOWN, (r'(LIN.*),E2 [-.\d]+', r'\1'), 'does not say where the external axes stand'),
+    ('krl', KNOWN, (STANDS[0], 'BAS(#BASE,17)'), 'whether base 17 goes along with the positioner'),
+    ('krl', KNOWN, STANDS, 'where the track begins in it is not known; say it with --world'),
+    ('krl', (*KNOWN, '--world', '0,0,0,0,0,0'), STANDS, ALONG),
+    ('krl', KNOWN, ('E4 0.0', 'E4 1.0'), 'moves external axes'),
+    ('rapid', KNOWN, ('PROC main', SECOND), 'with STN1 and STN2, and a robot file has one'),
+    ('fanuc-ls', KNOWN, (' COORD', ''), ALONG),
+    ('fanuc-ls', KNOWN, (r'J(\d) = (\S+) deg, (?=.*E1)', r'\2 '), 'needs X Y Z W P R, or J1'),
 ]
 
 
@@ -344,7 +293,9 @@ OPEN = [
 def test_what_a_program_leaves_open_is_asked_for_and_nothing_is_written(
     cell, arm, language, options, change, sentence
 ):
-    ran = corrected(cell, language, change(WRITE[language](arm)), *options)
+    text = WRITE[language](arm)
+    text = re.sub(*change, text) if change else text
+    ran = corrected(cell, language, text, *(word or EXTERNAL[language] for word in options))
     assert ran.code == 2
     assert sentence in ran.err
     assert ran.err.count('\n') == 1

@@ -37,16 +37,21 @@ ROUNDING = {'inform': 2.5e-5, 'fanuc-ls': 5e-5}
 OFFSETS = np.array([2e-4, 8e-4, -5e-4, 3e-4, 2e-4, 0.0])
 
 
+def words(path, robot, out, model=None):
+    """Return the command that corrects a program."""
+    return 'correct', path, '--robot', robot, '--out', out, *(('--model', model) if model else ())
+
+
 def texts(folder, files):
     return [(folder / name).read_bytes().decode('latin-1') for name in files]
 
 
 def effects(robot):
-    names = [(name, float(value)) for name, value in zip(robot.joint_names, OFFSETS, strict=True)]
+    pairs = zip(robot.joint_names, OFFSETS.tolist(), strict=True)
     return yaml.safe_dump(
         [
             {'effect': 'joint_offset', 'joint': name, 'offset': value}
-            for name, value in names
+            for name, value in pairs
             if value
         ]
     )
@@ -99,10 +104,7 @@ def unmarked(folder, language):
 @pytest.mark.parametrize('language', CELLS)
 def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
     robot, files, _, _ = CELLS[language]
-    done(
-        *('correct', MADE / files[0], '--robot', robot, '--out', tmp_path / 'out'),
-        *OPTIONS.get(language, []),
-    )
+    done(*words(MADE / files[0], robot, tmp_path / 'out'), *OPTIONS.get(language, []))
     for name in files:
         assert (tmp_path / 'out' / name).read_bytes() == (MADE / name).read_bytes()
 
@@ -114,36 +116,28 @@ def test_a_program_that_was_cut_off_is_refused(language, tmp_path):
         (tmp_path / name).write_bytes((MADE / name).read_bytes())
     path = tmp_path / files[0]
     path.write_bytes(path.read_bytes().rstrip()[:-9].rstrip())
-    said = refused('correct', path, '--robot', robot, '--out', tmp_path / 'out')
-    assert 'is the file cut off?' in said
+    assert 'is the file cut off?' in refused(*words(path, robot, tmp_path / 'out'))
 
 
 def test_points_in_two_files_of_one_name_are_refused(tmp_path):
     for name, copy in (('.src', '.src'), ('.dat', '.dat'), ('.dat', '.DAT')):
         (tmp_path / f'bracket{copy}').write_bytes((MADE / f'bracket{name}').read_bytes())
-    words = ('correct', tmp_path / 'bracket.src', '--robot', 'kuka_kr16_2')
-    said = refused(*words, '--out', tmp_path / 'out')
+    said = refused(*words(tmp_path / 'bracket.src', 'kuka_kr16_2', tmp_path / 'out'))
     assert "bracket.DAT' and 'bracket.dat' both belong" in said
 
 
 def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
-    said = refused(
-        *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
-        *('--out', tmp_path / 'out'),
-    )
-    assert '--pulses-per-degree' in said
-    assert said.count('\n') == 1 and not (tmp_path / 'out').exists()
+    said = refused(*words(MADE / 'bracket.jbi', 'yaskawa_ma1440', tmp_path / 'out'))
+    assert '--pulses-per-degree' in said and not (tmp_path / 'out').exists()
 
 
 @pytest.mark.parametrize('language', CELLS)
 def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(language, tmp_path):
     name, files, reader, near = CELLS[language]
     robot = wt.load(name)
-    (tmp_path / 'found.yaml').write_text(effects(robot))
-    said = done(
-        *('correct', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
-    )
+    model, options = tmp_path / 'found.yaml', OPTIONS.get(language, [])
+    model.write_text(effects(robot))
+    done(*words(MADE / files[0], name, tmp_path / 'out', model), *options)
     before, after = (reader(texts(folder, files)) for folder in (MADE, tmp_path / 'out'))
     assert [word for word, _ in before] == [word for word, _ in after]
     tool = tool_of(robot, language)
@@ -168,22 +162,16 @@ def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(langu
     (tmp_path / 'elsewhere').mkdir()
     for file in files:
         (tmp_path / 'out' / file).rename(tmp_path / 'elsewhere' / file)
-    said = refused(
-        *('correct', tmp_path / 'elsewhere' / files[0], '--robot', name, '--out', tmp_path / 'b'),
-        *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
-    )
+    moved = tmp_path / 'elsewhere' / files[0]
+    said = refused(*words(moved, name, tmp_path / 'b', model), *options)
     assert 'was corrected already' in said and not (tmp_path / 'b').exists()
 
 
 def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-4):
     (tmp_path / name).write_text(text)
-    (tmp_path / 'found.yaml').write_text(
-        f'- {{effect: joint_offset, joint: {wt.load(robot).joint_names[1]}, offset: {offset}}}\n'
-    )
-    return weld_twin(
-        *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'found.yaml', *more),
-    )
+    joint, model = wt.load(robot).joint_names[1], tmp_path / 'found.yaml'
+    model.write_text(f'- {{effect: joint_offset, joint: {joint}, offset: {offset}}}\n')
+    return weld_twin(*words(tmp_path / name, robot, tmp_path / 'out', model), *more)
 
 
 SEAM = """def seam():
@@ -237,8 +225,8 @@ def test_play_asks_for_no_leap_that_a_joint_cannot_make_between_timed_points(
     ]
     text = json.dumps({'joint_names': robot.joint_names, 'points': points})
     (tmp_path / 'plan.json').write_text(text)
-    words = ('--robot', 'ur5', '--model', tmp_path / 'found.yaml', '--out', tmp_path / 'out')
-    said = done('correct', tmp_path / 'plan.json', *words)
+    model = tmp_path / 'found.yaml'
+    said = done(*words(tmp_path / 'plan.json', 'ur5', tmp_path / 'out', model))
     assert ('rad/s^2 between these points, and the robot file allows 15' in said) is calm
     made = json.loads((tmp_path / 'out' / 'plan.json').read_text())['points']
     moved = np.array([point['positions'] for point in made]) - q
@@ -247,10 +235,9 @@ def test_play_asks_for_no_leap_that_a_joint_cannot_make_between_timed_points(
 
 def test_commands_that_leap_by_play_are_told(tmp_path):
     (tmp_path / 'found.yaml').write_text('- {effect: backlash, joint: elbow_joint, width: 1e-3}\n')
-    words = ('--robot', 'ur5', '--path', 'spline', '--profile', 'aggressive', '--rate', '250')
-    done('simulate', *words, '--out', tmp_path / 'bag')
-    words = ('--robot', 'ur5', '--model', tmp_path / 'found.yaml', '--out', tmp_path / 'out')
-    said = done('correct', tmp_path / 'bag', *words)
+    seam = ('--robot', 'ur5', '--path', 'spline', '--profile', 'aggressive', '--rate', '250')
+    done('simulate', *seam, '--out', tmp_path / 'bag')
+    said = done(*words(tmp_path / 'bag', 'ur5', tmp_path / 'out', tmp_path / 'found.yaml'))
     assert 'the correction alone would ask elbow_joint for' in said
     # By hand: a step of 1 mrad within 4 ms takes 0.25 rad/s, and to come to that 62.5 rad/s^2.
     robot, shift = wt.load('ur5'), np.zeros((5, 6))
@@ -294,10 +281,8 @@ def test_what_is_expected_counts_the_way_and_what_an_encoder_rounds(tmp_path):
         f'- {{effect: joint_offset, {pan}, offset: {off}}}\n'
         f'- {{effect: quantization, {pan}, step: {step}}}\n'
     )
-    done(
-        *('correct', tmp_path / 'out.script', '--robot', 'ur5', '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'found.yaml', '--max-correction', '5mm', '1deg'),
-    )
+    asked = words(tmp_path / 'out.script', 'ur5', tmp_path / 'out', tmp_path / 'found.yaml')
+    done(*asked, '--max-correction', '5mm', '1deg')
     expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
     before, after = (expected[when]['rms_m'] for when in ('before', 'after'))
     along = np.linspace(0.4, 0.7, 3001)
@@ -336,18 +321,8 @@ def test_two_tools_that_the_program_only_names_are_not_both_that_of_the_robot_fi
         (other, ('--tool', '2=0,0,90,0,0,0'), 'the tool of the robot file was taken'),
     ):
         (tmp_path / 'p.ls').write_text(each)
-        said = weld_twin(
-            *(
-                'correct',
-                tmp_path / 'p.ls',
-                '--robot',
-                robot,
-                '--out',
-                tmp_path / 'out',
-                '--force',
-            ),
-            *('--model', tmp_path / 'off.yaml', *more),
-        )
+        asked = words(tmp_path / 'p.ls', robot, tmp_path / 'out', tmp_path / 'off.yaml')
+        said = weld_twin(*asked, '--force', *more)
         assert said_of in said.out + said.err
 
 
@@ -489,12 +464,10 @@ def test_an_axis_that_would_pass_where_a_flag_changes_is_left(
     )
     off = f'- {{effect: joint_offset, joint: {arm.joint_names[axis - 1]}, offset: 1e-3}}'
     (tmp_path / 'off.yaml').write_text(off)
-    said = done(
-        *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'off.yaml'),
-        *(['--tool', '1=0,0,0,0,0,0'] if height else []),
-        *(['--pulses-per-degree', ','.join(['1000'] * 6)] if name == 'p.jbi' else []),
-    )
+    more = ['--tool', '1=0,0,0,0,0,0'] if height else []
+    more += ['--pulses-per-degree', ','.join(['1000'] * 6)] if name == 'p.jbi' else []
+    asked = words(tmp_path / name, robot, tmp_path / 'out', tmp_path / 'off.yaml')
+    said = done(*asked, *more)
     assert (f'axis {axis} would pass an angle at which the flags' in said) == left, said
 
 
@@ -534,13 +507,10 @@ def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
     (tmp_path / 'seam.script').write_text(SEAM)
     content = {'schema': 'weld_twin/diagnosis/1', 'model': {'robot': 'ur10', 'kinematics': 'x'}}
     unsound = {'schema': 'weld_twin/diagnosis/1', 'unsound': [{'sentence': 'joints are swapped'}]}
-    for data, words in ((content, "of the robot 'ur10'"), (unsound, 'were unsound: joints are')):
-        (tmp_path / 'diagnosis.json').write_text(json.dumps(data))
-        said = refused(
-            *('correct', tmp_path / 'seam.script', '--robot', 'ur5'),
-            *('--model', tmp_path / 'diagnosis.json', '--out', tmp_path / 'out'),
-        )
-        assert words in said
+    model = tmp_path / 'diagnosis.json'
+    for data, told in ((content, "of the robot 'ur10'"), (unsound, 'were unsound: joints are')):
+        model.write_text(json.dumps(data))
+        assert told in refused(*words(tmp_path / 'seam.script', 'ur5', tmp_path / 'out', model))
 
 
 def a_line_on_which_a_joint_turns_around(tmp_path, found):
@@ -557,11 +527,9 @@ def a_line_on_which_a_joint_turns_around(tmp_path, found):
     text = f'def seam():\n  movej([{places[0]}])\n  movel(p[{places[1]}], v=0.02)\n'
     text += f'  movel(p[{places[2]}], v=0.02)\nend\n'
     (tmp_path / 'seam.script').write_text(text)
-    (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
-    said = weld_twin(
-        *('correct', tmp_path / 'seam.script', '--robot', 'ur5'),
-        *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml'),
-    )
+    model = tmp_path / 'found.yaml'
+    model.write_text(yaml.safe_dump(found))
+    said = weld_twin(*words(tmp_path / 'seam.script', 'ur5', tmp_path / 'out', model))
     reach = np.hypot(*front[:2, 3])
     return said, [reach, *(np.hypot(line[0], line[1]) for line in lines)]
 
@@ -588,11 +556,10 @@ def test_what_play_spoils_is_corrected_without_it(tmp_path):
 
 def test_a_correction_finer_than_the_language_writes_is_none(tmp_path):
     found = [{'effect': 'joint_offset', 'joint': 'joint_2_l', 'offset': 4e-6}]
-    (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
-    said = refused(
-        *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
-        *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml', *OPTIONS['inform']),
-    )
+    model = tmp_path / 'found.yaml'
+    model.write_text(yaml.safe_dump(found))
+    asked = words(MADE / 'bracket.jbi', 'yaskawa_ma1440', tmp_path / 'out', model)
+    said = refused(*asked, *OPTIONS['inform'])
     assert 'too little is gained' in said
 
 
@@ -601,17 +568,15 @@ def test_a_model_with_nothing_to_mend_moves_no_point_and_says_so(tmp_path):
     assert said.code == 0, said.err
     told = json.loads((tmp_path / 'out' / 'correction.json').read_text())
     assert any('no point was moved' in note for note in told['notes'])
-    assert [move['moved_m'] for move in told['moves']] == pytest.approx(
-        [0.0] * len(reaches), abs=1e-6
-    )
+    moved = [move['moved_m'] for move in told['moves']]
+    assert moved == pytest.approx([0.0] * len(reaches), abs=1e-6)
 
 
 def test_slips_are_told_of_a_file_by_hand_and_not_of_what_a_diagnosis_leaves_open(
     elbow_found, tmp_path
 ):
     def told(model):
-        words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'out')
-        return weld_twin('correct', MADE / 'bracket.script', *words).err
+        return weld_twin(*words(MADE / 'bracket.script', 'ur5', tmp_path / 'out', model)).err
 
     assert 'below zero' not in told(Path(elbow_found) / 'diagnosis.json')
     spring = '- {effect: joint_compliance, joint: elbow_joint, compliance: -1.0e-6}\n'

@@ -28,11 +28,8 @@ PULSES = ('--pulses-per-degree', '1000,-1200,1100,900,-800,700')
 def exported(language, path, tmp_path, *more):
     robot, suffix, reader, rounding = CELLS[language]
     out = tmp_path / f'measure.{suffix}'
-    done(
-        *('export', 'program', path, '--robot', robot, '--controller', language, '--out', out),
-        *(PULSES if language == 'inform' else ()),
-        *more,
-    )
+    words = ('export', 'program', path, '--robot', robot, '--controller', language)
+    done(*words, *(PULSES if language == 'inform' else ()), *more, '--out', out)
     text = out.read_bytes().decode('latin-1')
     moves = reader([text, ''] if language == 'krl' else [text])
     return wt.load(robot), text, [places[-1] for _, places in moves], rounding
@@ -41,10 +38,13 @@ def exported(language, path, tmp_path, *more):
 def stations(robot, tmp_path):
     middle = 0.5 * (np.maximum(robot.lower, -2.0) + np.minimum(robot.upper, 2.0))
     q = middle + np.random.default_rng(3).uniform(-0.4, 0.4, (5, 6)).round(6)
+    return write_stations(tmp_path / 'next_experiment.yaml', q), q
+
+
+def write_stations(path, q):
     content = {'kind': 'joints', 'stations': True, 't': [0.0, 9.0, 18.0, 27.0, 36.0]}
-    path = tmp_path / 'next_experiment.yaml'
     path.write_text(yaml.safe_dump({**content, 'q': q.tolist()}))
-    return path, q
+    return path
 
 
 @pytest.mark.parametrize('language', CELLS)
@@ -133,20 +133,15 @@ def test_the_controller_comes_to_the_posture_that_was_meant(tmp_path):
     ],
 )
 def test_what_cannot_be_written_is_refused_in_one_sentence(words, what, tmp_path):
-    said = refused(
-        'export', 'program', 'line', '--robot', 'ur5', *words, '--out', tmp_path / 'p.src'
-    )
-    assert what in said
+    asked = ('export', 'program', 'line', '--robot', 'ur5', *words)
+    assert what in refused(*asked, '--out', tmp_path / 'p.src')
     assert not list(tmp_path.iterdir())
 
 
 def test_a_station_beyond_the_limits_is_refused(tmp_path):
     path, q = stations(wt.load('kuka_kr16_2'), tmp_path)
     q[2, 1] = 2.0
-    content = {'kind': 'joints', 'stations': True, 't': [0.0, 9.0, 18.0, 27.0, 36.0]}
-    path.write_text(yaml.safe_dump({**content, 'q': q.tolist()}))
-    said = refused(
-        *('export', 'program', path, '--robot', 'kuka_kr16_2', '--controller', 'krl'),
-        *('--out', tmp_path / 'p.src'),
-    )
+    write_stations(path, q)
+    words = ('export', 'program', path, '--robot', 'kuka_kr16_2', '--controller', 'krl')
+    said = refused(*words, '--out', tmp_path / 'p.src')
     assert 'limits' in said and not (tmp_path / 'p.src').exists()

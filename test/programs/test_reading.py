@@ -628,7 +628,7 @@ def test_what_ends_no_statement_is_read_in_the_time_of_other_lines(line, many):
     source = (MADE / 'bracket.mod').read_text().replace('MODULE', line * many + 'MODULE', 1)
     begin = time.process_time()
     read('rapid', (source,))
-    assert time.process_time() - begin < 5.0  # half a second; seven where a statement may go on
+    assert time.process_time() - begin < 5.0  # half a second; nine where a statement may go on
 
 
 def test_places_count_their_lines():

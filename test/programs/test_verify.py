@@ -46,10 +46,15 @@ def stations(seed, count=40):
     return NEAR + np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6))
 
 
+def way_of(folder):
+    """Return how a controller runs the program of a folder."""
+    text = [(folder / name).read_bytes().decode('latin-1') for name in FILES]
+    return driven(ARM, readers.krl(text), NEAR, 0.05)
+
+
 def run_program(folder, off, seed):
     """Return what is recorded while the controller runs a program and a tracker looks on."""
-    text = [(folder / name).read_bytes().decode('latin-1') for name in FILES]
-    way = driven(ARM, readers.krl(text), NEAR, 0.05)
+    way = way_of(folder)
     # Corners are among the samples, or the arm would cut them.
     every = np.arange(0, len(way.clock), max(len(way.clock) // 400, 1))
     keep = np.union1d(every, np.searchsorted(way.clock, way.ends[:-1]))
@@ -62,15 +67,12 @@ def cell(tmp_path_factory):
     folder = tmp_path_factory.mktemp('verify')
     write_robot_yaml(folder / 'robot.yaml', ARM)
     write_recording(folder / 'before', measured(stations(1), OFF, 1), ARM)
-    said = done(
-        *('diagnose', folder / 'before', '--robot', folder / 'robot.yaml'),
-        *('--out', folder / 'found', '--region', BOX, *ZEROS_ALONE),
-    )
+    robot = ('--robot', folder / 'robot.yaml')
+    words = ('diagnose', folder / 'before', *robot, '--region', BOX, *ZEROS_ALONE)
+    said = done(*words, '--out', folder / 'found')
     assert f"In the region '{BOX}'" in said.replace('\n', ' ')
-    said = done(
-        *('correct', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
-        *('--model', folder / 'found' / 'diagnosis.json', '--out', folder / 'better'),
-    )
+    words = ('correct', MADE / FILES[0], *robot, '--model', folder / 'found' / 'diagnosis.json')
+    done(*words, '--out', folder / 'better')
     return folder
 
 
@@ -105,12 +107,10 @@ def test_a_program_that_was_never_loaded_is_told(cell, tmp_path):
 
 def test_an_arm_that_changed_since_breaks_the_promise_and_the_joint_is_named(cell, tmp_path):
     now = OFF + [0.0, 2.4e-3, 0.0, 0.0, 0.0, 0.0]
-    said, content = verify(
-        cell, tmp_path, run_program(cell / 'better', now, 4), '--program', cell / 'better'
-    )
-    true = np.linalg.norm(
-        [tool_pose(ROBOT, NEAR, TOOL, now)[:3, 3] - tool_pose(ROBOT, NEAR, TOOL, OFF)[:3, 3]]
-    )
+    recording = run_program(cell / 'better', now, 4)
+    said, content = verify(cell, tmp_path, recording, '--program', cell / 'better')
+    one, other = (tool_pose(ROBOT, NEAR, TOOL, off)[:3, 3] for off in (now, OFF))
+    true = np.linalg.norm(one - other)
     assert said.code == NOT_KEPT
     assert 0.5 * true < content['measured']['rms_m'] < 2.0 * true
     assert states(content) == {'joint_a2': 'grew', 'joint_a4': 'gone'}
@@ -132,11 +132,8 @@ def test_zeros_that_were_mastered_are_told_one_by_one(mended, code, left, cell, 
 
 def test_a_tracker_that_was_set_up_anew_is_asked_for_and_fitted(cell, tmp_path):
     recording = measured(stations(6, 30), 0.0 * OFF, 6)
-    moved = Measurements(
-        recording.measured.t,
-        recording.measured.position @ along(0, 0)[:3, :3].T + [0.4, -2.0, 0.3],
-    )
-    recording = recording.with_measured(moved)
+    seen = recording.measured.position @ along(0, 0)[:3, :3].T + [0.4, -2.0, 0.3]
+    recording = recording.with_measured(Measurements(recording.measured.t, seen))
     write_recording(tmp_path / 'elsewhere', recording, ARM)
     model = ('--model', cell / 'found' / 'diagnosis.json')
     assert '--align base' in refused('verify', tmp_path / 'elsewhere', *model)
@@ -223,15 +220,8 @@ def test_a_program_is_corrected_for_the_numbers_that_the_controller_has(robot, c
 def test_a_diagnosis_of_another_version_or_shape_is_refused(part, value, cell, tmp_path):
     content = json.loads((cell / 'found' / 'diagnosis.json').read_text())
     (tmp_path / 'd.json').write_text(json.dumps(content | {part: value}))
-    words = (
-        '--robot',
-        cell / 'robot.yaml',
-        '--model',
-        tmp_path / 'd.json',
-        '--out',
-        tmp_path / 'o',
-    )
-    assert 'd.json' in refused('correct', MADE / FILES[0], *words)
+    words = ('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml', '--out', tmp_path / 'o')
+    assert 'd.json' in refused(*words, '--model', tmp_path / 'd.json')
     assert not (tmp_path / 'o').exists()
 
 
@@ -255,18 +245,12 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     off = OFF + [1.5e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
     write_recording(tmp_path / 'rec', measured(stations(8), off, 8), ARM)
     robot = ('--robot', cell / 'robot.yaml')
-    said = done(
-        *('diagnose', tmp_path / 'rec', *robot, '--align', 'base'),
-        *('--out', tmp_path / 'found', *ZEROS_ALONE),
-    )
+    words = ('diagnose', tmp_path / 'rec', *robot, '--align', 'base', *ZEROS_ALONE)
+    done(*words, '--out', tmp_path / 'found')
     model = ('--model', tmp_path / 'found' / 'diagnosis.json')
     said = done('correct', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
     assert 'frames were fitted to the recording (base)' in said
-    texts = [
-        [(folder / name).read_bytes().decode('latin-1') for name in FILES]
-        for folder in (MADE, tmp_path / 'out')
-    ]
-    meant, run = (driven(ARM, readers.krl(text), NEAR, 0.05) for text in texts)
+    meant, run = way_of(MADE), way_of(tmp_path / 'out')
     real = np.array([tool_pose(ROBOT, q, TOOL, off)[:3, 3] for q in run.joints[::5]])
     apart = np.linalg.norm(real[:, None] - meant.tool[None], axis=2).min(axis=1)
     true = np.sqrt((apart**2).mean())
@@ -276,11 +260,7 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
 
 def off_the_path(folder):
     """Return how far the real tool is from the path that was meant, at its worst [m]."""
-    texts = [
-        [(place / name).read_bytes().decode('latin-1') for name in FILES]
-        for place in (MADE, folder)
-    ]
-    meant, run = (driven(ARM, readers.krl(text), NEAR, 0.05) for text in texts)
+    meant, run = way_of(MADE), way_of(folder)
     real = np.array([tool_pose(ROBOT, q, TOOL, OFF)[:3, 3] for q in run.joints[::5]])
     way = np.diff(meant.tool, axis=0)
     off = real[:, None] - meant.tool[:-1]
@@ -290,11 +270,9 @@ def off_the_path(folder):
 
 @pytest.mark.parametrize(('size', 'decided'), [(5e-4, 'as kept'), (2e-6, 'as not kept')])
 def test_a_tolerance_is_decided_by_how_sure_the_correction_is(size, decided, cell, tmp_path):
-    said = done(
-        *('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml'),
-        *('--model', cell / 'found' / 'diagnosis.json', '--out', tmp_path / 'out'),
-        *('--tolerance', f'{size * 1e3:g}mm'),
-    )
+    words = ('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml')
+    words += ('--model', cell / 'found' / 'diagnosis.json', '--tolerance', f'{size * 1e3:g}mm')
+    said = done(*words, '--out', tmp_path / 'out')
     assert f'it counts {decided}' in said
     assert f'it counts {decided}' in (tmp_path / 'out' / 'report.html').read_text()
     told = json.loads((tmp_path / 'out' / 'correction.json').read_text())['tolerance']
@@ -315,10 +293,9 @@ def test_a_tolerance_needs_a_model_that_says_how_sure_it_is(cell, tmp_path):
 
 
 def plan_more(cell, *words, postures=12):
-    return weld_twin(
-        *('investigate', '--robot', cell / 'robot.yaml', '--tolerance', 0.02),
-        *('--model', cell / 'found' / 'diagnosis.json', '--postures', postures, *words),
-    )
+    asked = ('investigate', '--robot', cell / 'robot.yaml', '--tolerance', 0.02)
+    model = ('--model', cell / 'found' / 'diagnosis.json')
+    return weld_twin(*asked, *model, '--postures', postures, *words)
 
 
 def test_a_plan_promises_in_a_region_what_the_diagnosis_warns_of(cell):

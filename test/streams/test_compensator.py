@@ -22,7 +22,6 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.action import ActionClient
-from std_msgs.msg import String
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
@@ -65,17 +64,10 @@ def write_model(path, off=OFF, *more):
     domain = Domain(NAMES, ranges, (0.02,) * 6, (True,) * 6, load=(60.0, 60.0))
     rest = Discrepancy(2e-5, 1e-6, np.zeros(6), np.zeros(6), 1.0)
     known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
-    content = {
-        'schema': 'weld_twin/diagnosis/1',
-        'shrink': {'rms_after_m': 3e-5},
-        'model': {
-            'tool': ROBOT.T_flange_tool.tolist(),
-            'bases': [ROBOT.T_world_base.tolist()],
-            'known': [],
-            'found': [{'effect': 'joint_offset', 'joint': NAMES[2], 'offset': off}, *more],
-        },
-        'posterior': as_dict(known),
-    }
+    found = [{'effect': 'joint_offset', 'joint': NAMES[2], 'offset': off}, *more]
+    frames = {'tool': ROBOT.T_flange_tool.tolist(), 'bases': [ROBOT.T_world_base.tolist()]}
+    content = {'schema': 'weld_twin/diagnosis/1', 'model': {**frames, 'known': [], 'found': found}}
+    content |= {'shrink': {'rms_after_m': 3e-5}, 'posterior': as_dict(known)}
     path.write_text(json.dumps(content))
 
 
@@ -98,24 +90,19 @@ class Planner:
         self.model, self.active = model, False
         self.controller = cell.add(Controller, NAMES, HOME, 4.0)
         self.process = cell.start('compensator', robot='ur5', model=str(model), **parameters)
-        cell.node.create_subscription(
-            String,
-            '/compensator/audit',
-            lambda line: self.audit.append(json.loads(line.data)),
-            AUDIT.requested.to_rclpy(),
-        )
         self.added = []
-        cell.node.create_subscription(
-            CORRECTION.message_class(),
-            '/compensator/correction',
-            self.added.append,
-            CORRECTION.requested.to_rclpy(),
-        )
+        self.hear(AUDIT, 'audit', lambda line: self.audit.append(json.loads(line.data)))
+        self.hear(CORRECTION, 'correction', self.added.append)
         self._change = cell.node.create_client(ChangeState, '/compensator/change_state')
         self.client = ActionClient(cell.node, self.kind, '/compensator/follow_joint_trajectory')
         cell.wait(self._change.service_is_ready, 'the transitions')
         cell.wait(self.client.server_is_ready, 'the action')
         cell.meet()
+
+    def hear(self, topic, name, take):
+        """Let a function take what the compensator sends on a topic."""
+        quality, name = topic.requested.to_rclpy(), f'/compensator/{name}'
+        self.cell.node.create_subscription(topic.message_class(), name, take, quality)
 
     def go(self, *steps):
         for step in steps:
@@ -165,9 +152,8 @@ def shared(tmp_path_factory, packages):
     folder = tmp_path_factory.mktemp('goals')
     write_model(folder / 'diagnosis.json')
     with Cell(folder / 'cell') as cell:
-        yield Planner(
-            cell, folder / 'diagnosis.json', apply=True, audit=str(folder / 'audit.jsonl')
-        )
+        audit = str(folder / 'audit.jsonl')
+        yield Planner(cell, folder / 'diagnosis.json', apply=True, audit=audit)
 
 
 @pytest.fixture
@@ -432,17 +418,8 @@ def test_what_goes_to_another_compensator_is_not_corrected(tmp_path, packages):
     model = tmp_path / 'diagnosis.json'
     write_model(model)
     with Cell(tmp_path / 'cell') as cell:
-        cell.add(
-            compensator.Compensator,
-            cli_args=[
-                '--ros-args',
-                '-r',
-                '__node:=second',
-                '-r',
-                '~/pose_in:=/compensator/pose_out',
-            ],
-            model=str(model),
-        )
+        named = ['-r', '__node:=second', '-r', '~/pose_in:=/compensator/pose_out']
+        cell.add(compensator.Compensator, cli_args=['--ros-args', *named], model=str(model))
         planner = Planner(cell, model, apply=True, controller='second')
         planner.go('configure', 'activate')
         cell.wait(lambda: '/second, which takes what is sent' in planner.process.log, 'the other')
@@ -455,33 +432,31 @@ def test_what_goes_to_another_compensator_is_not_corrected(tmp_path, packages):
         cell.wait(lambda: beside in planner.process.log, 'the sender beside')
 
 
-@pytest.mark.parametrize(
-    ('controller', 'sentence'),
-    [
-        ('/', 'names no controller'),
-        ('/compensator', 'names no controller'),
-        ('arm controller', 'is no name'),
-    ],
-)
+NO_CONTROLLERS = {'/': 'names no controller', '/compensator': 'names no controller'}
+NO_CONTROLLERS['arm controller'] = 'is no name'
+
+
+@pytest.mark.parametrize(('controller', 'sentence'), NO_CONTROLLERS.items())
 def test_goals_go_to_a_controller_that_is_named(controller, sentence, packages, capsys):
     words = ['--ros-args', '-p', f'controller:={controller}']
     assert compensator.main(words) == 2
     assert sentence in capsys.readouterr().err
 
 
+def deviate(planner, deviation, size, stamps):
+    """Publish deviations of a size at some stamps, and wait until they have come."""
+    for stamp in stamps:
+        deviation.publish(planner.cell.messages.vector3(stamp, np.array([size, 0.0, 0.0])))
+    planner.cell.meet()
+
+
 def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviation = planner.cell.publisher(DEVIATION)
-
-    def deviate():
-        for k in range(20):
-            deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
-        planner.cell.meet()
-
     planner.to(HOME + 1.0)  # where nothing was recorded, nothing was promised
-    deviate()
+    deviate(planner, deviation, 3e-4, range(20))
     planner.to(HOME)
     assert 'does not hold' not in planner.process.log
-    deviate()
+    deviate(planner, deviation, 3e-4, range(20))
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
     planner.cell.node.destroy_publisher(deviation)
@@ -493,18 +468,10 @@ def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(
     write_model(planner.model, OFF, {**lost, 'values': [-3e-4, 3e-4]})
     assert planner.cell.trigger('/compensator/reload').success
     seen(planner.cell, 0.5)  # in which the arm stands
-    deviation, before = (
-        planner.cell.publisher(DEVIATION),
-        planner.process.log.count('does not hold'),
-    )
-
-    def deviate(stamps):
-        for stamp in stamps:
-            deviation.publish(planner.cell.messages.vector3(stamp, np.array([3e-4, 0.0, 0.0])))
-        planner.cell.meet()
-
+    deviation = planner.cell.publisher(DEVIATION)
+    before = planner.process.log.count('does not hold')
     now = planner.cell.node.get_clock().now().nanoseconds
-    deviate(now - k * 4_000_000 for k in range(40))
+    deviate(planner, deviation, 3e-4, (now - k * 4_000_000 for k in range(40)))
     handle, line = planner.send(planner.goal(sway()))
     assert handle.accepted, line
     assert 'no bound is told' in ' '.join(line['notes'])
@@ -512,7 +479,7 @@ def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(
     track = planner.controller.track
     fast = [stamp for stamp, t in track if 0.3 < t < 0.7]
     assert len(fast) > 20
-    deviate(fast)
+    deviate(planner, deviation, 3e-4, fast)
     told = lambda: planner.process.log.count('does not hold') > before  # noqa: E731
     planner.cell.wait(told, 'the notice')
     planner.cell.node.destroy_publisher(deviation)
@@ -520,20 +487,14 @@ def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(
 
 def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
     deviation = planner.cell.publisher(DEVIATION)
-
-    def deviate(count):
-        for k in range(count):
-            deviation.publish(planner.cell.messages.vector3(k, np.array([1e-5, 0.0, 0.0])))
-        planner.cell.meet()
-
-    deviate(5)
+    deviate(planner, deviation, 1e-5, range(5))
     for _ in range(20):  # a busy machine takes long for these
         seen(planner.cell, 2.2)
         planner.refused(planner.goal(sway()), 'the tracker is lost')
         begun = time.monotonic()
-        deviate(19)
+        deviate(planner, deviation, 1e-5, range(19))
         _, early = planner.send(planner.goal(sway()))
-        deviate(1)
+        deviate(planner, deviation, 1e-5, range(1))
         handle, line = planner.send(planner.goal(sway()))
         if time.monotonic() - begun < 1.9:
             break  # else it was lost once more meanwhile
@@ -557,9 +518,8 @@ def test_a_controller_that_dies_ends_its_goal(planner):
 def shadow(tmp_path, packages):
     write_model(tmp_path / 'diagnosis.json')
     with Cell(tmp_path / 'cell') as cell:
-        planner = Planner(
-            cell, tmp_path / 'diagnosis.json', apply=False, executor='single_threaded'
-        )
+        model = tmp_path / 'diagnosis.json'
+        planner = Planner(cell, model, apply=False, executor='single_threaded')
         planner.go('configure', 'activate')
         yield planner
 
@@ -569,12 +529,9 @@ class Poses:
 
     def __init__(self, planner):
         self.planner, self.cell, self.out = planner, planner.cell, []
-        kind, node = POSE_OUT.message_class(), planner.cell.node
-        node.create_subscription(
-            kind, '/compensator/pose_out', self.out.append, POSE_OUT.requested.to_rclpy()
-        )
-        self._given = node.create_publisher(
-            kind, '/compensator/pose_in', POSE_IN.offered.to_rclpy()
+        planner.hear(POSE_OUT, 'pose_out', self.out.append)
+        self._given = planner.cell.node.create_publisher(
+            POSE_IN.message_class(), '/compensator/pose_in', POSE_IN.offered.to_rclpy()
         )
         self.cell.wait(lambda: self._given.get_subscription_count() == 1, 'the compensator')
         self.cell.meet()

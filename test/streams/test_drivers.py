@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 import rclpy
-from geometry_msgs.msg import PointStamped, PoseStamped, TransformStamped
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, TransformStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
@@ -46,108 +46,70 @@ def numbered(name, count=6):
 
 @dataclass(frozen=True)
 class Driver:
-    """
-    Joints as a driver publishes them.
+    """Joints as a driver publishes them."""
 
-    Attributes
-    ----------
-    source : str
-        Repository, file and commit that the layout was read from.
-    robot : str
-        The model that stands for the arm.
-    names : tuple of str
-        The arm's joints in the order of the robot.
-    order : tuple of int
-        Places of the published joints in that order.
-    beside : tuple of str
-        Other joints in the same message.
-    velocities : bool
-        Whether it has a velocity interface; the broadcaster gives NaN otherwise.
-    sensor : bool
-        Best effort, as sensor data.
-    options : dict
-        Parameters of the nodes.
-
-    """
-
-    source: str
-    robot: str
-    names: tuple
-    order: tuple = (0, 1, 2, 3, 4, 5)
-    beside: tuple = ()
-    velocities: bool = True
-    sensor: bool = False
-    options: dict = field(default_factory=dict)
+    source: str  # repository, file and commit that the layout was read from
+    robot: str  # the model that stands for the arm
+    names: tuple  # the arm's joints in the order of the robot
+    beside: tuple = ()  # other joints in the same message
+    order: tuple = (0, 1, 2, 3, 4, 5)  # places of the published joints in that of the robot
+    velocities: bool = True  # whether it has a velocity interface; else the broadcaster gives NaN
+    sensor: bool = False  # best effort, as sensor data
+    options: dict = field(default_factory=dict)  # parameters of the nodes
 
 
-KUKA_MAP = '{' + ', '.join(f'joint_a{k}: joint_{k}' for k in range(1, 7)) + '}'
+UR = 'UniversalRobots/Universal_Robots_ROS2_Driver ur_robot_driver/config/ur_controllers.yaml 032aad68'
+UR5E = tuple(load('ur5e').joint_names)
+MOTO = 'Yaskawa-Global/motoros2 config/motoros2_config.yaml 045485df'
 YASKAWA = ('joint_1_s', 'joint_2_l', 'joint_3_u', 'joint_4_r', 'joint_5_b', 'joint_6_t')
 YASKAWA_MAP = '{' + ', '.join(f'{n}: joint_{k}' for k, n in enumerate(YASKAWA, 1)) + '}'
+GROUP = {'joint_prefix': 'group_1/', 'joint_map': YASKAWA_MAP}
+FANUC = (
+    'FANUC-CORPORATION/fanuc_driver fanuc_hardware_interface/config/ros2_controllers.yaml 71c1ae47'
+)
+KUKA = 'kroshu/kuka_drivers kuka_rsi_driver/config/'
+RSI = f'{KUKA}joint_trajectory_controller_config_6_axis_kl.yaml cca4b3b3'
+DUAL = f'{KUKA}dual_arm/joint_trajectory_controller_config_dual_arm.yaml eb24c5cb'
+KUKA_MAP = '{' + ', '.join(f'joint_a{k}: joint_{k}' for k in range(1, 7)) + '}'
 DRIVERS = {
-    'ur_robot_driver': Driver(
-        'UniversalRobots/Universal_Robots_ROS2_Driver ur_robot_driver/config/ur_controllers.yaml '
-        '032aad68',
-        'ur5e',
-        tuple(load('ur5e').joint_names),
-        order=UR_ORDER,
-    ),
+    'ur_robot_driver': Driver(UR, 'ur5e', UR5E, order=UR_ORDER),
     'ur_robot_driver, tf_prefix': Driver(
-        'UniversalRobots/Universal_Robots_ROS2_Driver ur_robot_driver/config/ur_controllers.yaml '
-        '032aad68',
-        'ur5e',
-        tuple(f'alice_{name}' for name in load('ur5e').joint_names),
-        order=UR_ORDER,
+        UR, 'ur5e', tuple(f'alice_{name}' for name in UR5E), order=UR_ORDER
     ),
     'MotoROS2': Driver(
-        'Yaskawa-Global/motoros2 config/motoros2_config.yaml 045485df',
-        'yaskawa_ma2010',
-        numbered('group_1/joint_{}'),
-        sensor=True,
-        options={'joint_prefix': 'group_1/', 'joint_map': YASKAWA_MAP},
+        MOTO, 'yaskawa_ma2010', numbered('group_1/joint_{}'), sensor=True, options=GROUP
     ),
     'MotoROS2, R1+B1+S1': Driver(
-        'Yaskawa-Global/motoros2 config/motoros2_config.yaml 045485df',
+        MOTO,
         'yaskawa_ma2010',
         numbered('group_1/joint_{}'),
-        beside=('group_2/joint_1', 'group_3/joint_1', 'group_3/joint_2'),
+        ('group_2/joint_1', 'group_3/joint_1', 'group_3/joint_2'),
         sensor=True,
-        options={
-            'joint_prefix': 'group_1/',
-            'joint_map': YASKAWA_MAP,
-            'joints_beside': 'group_3/joint_1, group_3/joint_2',
-        },
+        options={**GROUP, 'joints_beside': 'group_3/joint_1, group_3/joint_2'},
     ),
     'fanuc_driver': Driver(
-        'FANUC-CORPORATION/fanuc_driver fanuc_hardware_interface/config/ros2_controllers.yaml '
-        '71c1ae47',
+        FANUC,
         'fanuc_m10id12',
         numbered('J{}'),
         velocities=False,
         options={'joint_map': '{' + ', '.join(f'joint_{k}: J{k}' for k in range(1, 7)) + '}'},
     ),
     'kuka_drivers': Driver(
-        'kroshu/kuka_drivers '
-        'kuka_rsi_driver/config/joint_trajectory_controller_config_6_axis_kl.yaml cca4b3b3',
-        'kuka_kr16_2',
-        numbered('joint_{}'),
-        velocities=False,
-        options={'joint_map': KUKA_MAP},
+        RSI, 'kuka_kr16_2', numbered('joint_{}'), velocities=False, options={'joint_map': KUKA_MAP}
     ),
     'kuka_drivers, linear unit': Driver(
-        'kroshu/kuka_drivers '
-        'kuka_rsi_driver/config/joint_trajectory_controller_config_6_axis_kl.yaml cca4b3b3',
+        RSI,
         'kuka_kr16_2',
         numbered('joint_{}'),
-        beside=('rail_joint_1',),
+        ('rail_joint_1',),
         velocities=False,
         options={'joint_map': KUKA_MAP},
     ),
     'kuka_drivers, two arms': Driver(
-        'kroshu/kuka_drivers '
-        'kuka_rsi_driver/config/dual_arm/joint_trajectory_controller_config_dual_arm.yaml eb24c5cb',
+        DUAL,
         'kuka_kr16_2',
         numbered('robot1_joint_{}'),
-        beside=numbered('robot2_joint_{}'),
+        numbered('robot2_joint_{}'),
         velocities=False,
         options={'joint_prefix': 'robot1_', 'joint_map': KUKA_MAP},
     ),
@@ -160,8 +122,8 @@ DRIVERS = {
         'frankaemika/franka_ros2 franka_bringup/config/controllers.yaml 07c6541f',
         'franka_panda',
         numbered('panda_joint{}', 7),
+        ('panda_finger_joint1', 'panda_finger_joint2'),
         order=tuple(range(7)),
-        beside=('panda_finger_joint1', 'panda_finger_joint2'),
         options={'joints_beside': 'panda_finger_joint1, panda_finger_joint2'},
     ),
     'doosan-robot2': Driver(
@@ -293,15 +255,13 @@ def tag(T, header):
 
 
 def pose(T, header):
-    out = PoseStamped(header=header)
-    fill(out.pose, T)
-    return out
+    return PoseStamped(header=header, pose=fill(Pose(), T))
 
 
 def point(T, header):
-    out = PointStamped(header=header)
-    out.point.x, out.point.y, out.point.z = T[:3, 3].tolist()
-    return out
+    return PointStamped(
+        header=header, point=Point(**dict(zip('xyz', T[:3, 3].tolist(), strict=True)))
+    )
 
 
 INSTRUMENTS = {

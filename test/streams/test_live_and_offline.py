@@ -47,22 +47,17 @@ EXAMPLES = {
     'vibration': {**ELBOW, 'frequency': 8.0, 'damping': 0.05, 'gain': 0.3},
 }
 """Entries of effects that typical sizes do not do for."""
-CELL = Robot.from_mapping(
-    ARM.to_mapping()
-    | {
-        'joints': [
-            {'name': 'track', 'type': 'prismatic', 'alpha': -1.57},
-            *ARM.to_mapping()['joints'],
-        ],
-        'links': [{'mass': 90.0, 'com': [0.0, 0.0, 0.1]}, *ARM.to_mapping()['links']],
-        'workpiece': {
-            'base': {'xyz': [1.2, 0.3, 0.4]},
-            'tool': {'xyz': [0.1, 0.0, 0.2]},
-            'joints': [{'name': 'tilt', 'a': 0.1, 'alpha': 1.5}, {'name': 'turn', 'd': 0.2}],
-            'links': [{'mass': 60.0, 'com': [0.1, 0, 0]}, {'mass': 30.0, 'com': [0, 0.1, 0]}],
-        },
-    }
-)
+TABLE = {
+    'base': {'xyz': [1.2, 0.3, 0.4]},
+    'tool': {'xyz': [0.1, 0.0, 0.2]},
+    'joints': [{'name': 'tilt', 'a': 0.1, 'alpha': 1.5}, {'name': 'turn', 'd': 0.2}],
+    'links': [{'mass': 60.0, 'com': [0.1, 0, 0]}, {'mass': 30.0, 'com': [0, 0.1, 0]}],
+}
+OWN = ARM.to_mapping()
+TRACK = {'name': 'track', 'type': 'prismatic', 'alpha': -1.57}
+ON_IT = {'mass': 90.0, 'com': [0.0, 0.0, 0.1]}
+MORE = {'joints': [TRACK, *OWN['joints']], 'links': [ON_IT, *OWN['links']], 'workpiece': TABLE}
+CELL = Robot.from_mapping(OWN | MORE)
 """The same arm on a track beside a positioner."""
 OF_CELLS = {
     'root_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
@@ -160,9 +155,8 @@ TAKEN = ('/joint_states', '/tool_wrench', '/temperature')
 def played(messages, twin):
     """Return what a running twin gives, message by message; what it refuses, it leaves out."""
     stream, out = JointStream(twin), []
-    take = dict(
-        zip(TAKEN, (stream.step, stream.take_wrench, stream.take_temperature), strict=True)
-    )
+    takers = (stream.step, stream.take_wrench, stream.take_temperature)
+    take = dict(zip(TAKEN, takers, strict=True))
     for topic, message in messages:
         try:
             sample = take[topic](message)
@@ -238,27 +232,19 @@ def test_curves_without_a_formula_are_the_same_over_every_quantity(some_velociti
     compare(some_velocities, (LAG, effect_from_mapping(entry)))
 
 
-@pytest.mark.parametrize(
-    ('frame', 'meaning'),
-    [
-        ('', 'tool'),
-        ('tool0', 'tool'),
-        ('left/tool0', 'tool'),
-        ('base', 'base'),
-        ('/base_link', 'base'),
-        ('world', 'base'),
-        ('map', 'base'),
-        ('force_sensor_database', 'tool'),
-        ('ft_frame', 'tool'),
-    ],
-)
+UNSURE = ('force_sensor_database', 'ft_frame')
+MEANINGS = dict.fromkeys(('', 'tool0', 'left/tool0', *UNSURE), 'tool')
+MEANINGS |= dict.fromkeys(('base', '/base_link', 'world', 'map'), 'base')
+
+
+@pytest.mark.parametrize(('frame', 'meaning'), MEANINGS.items())
 def test_a_wrench_frame_means_the_same_live_and_offline(tmp_path, frame, meaning):
     entries = in_order(sides(frame), joints())[:60]
     effects = (example('cartesian_compliance'), SPRING)
     recording, _ = compare(logged(tmp_path / 'bag', entries), effects, at_least=20)
     assert recording.wrench_frame == meaning
     told = [note for note in recording.notes if 'taken for the tool frame' in note]
-    assert bool(told) == (frame in ('force_sensor_database', 'ft_frame'))
+    assert bool(told) == (frame in UNSURE)
 
 
 @pytest.mark.parametrize('frame', ['gripper_base', 'torch_base_link'])
@@ -383,15 +369,9 @@ def test_the_window_of_the_live_diagnosis_is_the_recording_of_the_bag(tmp_path):
     with BagWriter(tmp_path / 'bag') as bag:
         for k, (_, topic, message) in enumerate(entries):
             bag.write(topic, message, START + k)
-    window, roles = (
-        Window(ARM, 60.0),
-        {
-            '/joint_states': Role.JOINTS,
-            '/tool_wrench': Role.WRENCH,
-            '/temperature': Role.TEMPERATURE,
-            '/measured/tool_pose': Role.POSE,
-        },
-    )
+    roles = {'/joint_states': Role.JOINTS, '/tool_wrench': Role.WRENCH}
+    roles |= {'/temperature': Role.TEMPERATURE, '/measured/tool_pose': Role.POSE}
+    window = Window(ARM, 60.0)
     for _, topic, message in entries:
         try:
             window.take(roles[topic], message)

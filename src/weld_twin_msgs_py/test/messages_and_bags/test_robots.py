@@ -233,6 +233,10 @@ def turning(kind='revolute', inside=''):
         (turning('floating'), "joint 'j' is floating"),
         (turning(inside='<axis xyz="0 0 0"/>'), "the axis of joint 'j' has no direction"),
         (turning(inside='<mimic joint="k"/>'), "joint 'j' mimics another"),
+        (
+            turning(inside='<origin xyz="0 0 0" rpy="0 -90 0"/>'),
+            "origin rpy of joint 'j' is -90, which looks like degrees in a radian field",
+        ),
         (urdf(('j', 'revolute', 'a', 'z', '')), "joint 'j' names a link 'z' that is not there"),
         (
             urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'c', 'b', '')),

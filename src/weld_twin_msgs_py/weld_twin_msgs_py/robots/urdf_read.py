@@ -18,6 +18,7 @@ from .controller_links import FLANGE, FixedLink, flange_link_of, foot_of
 from .urdf_tree import (
     CORRECTED,
     MOVABLE,
+    TURN,
     Axis,
     Joint,
     Tree,
@@ -27,8 +28,6 @@ from .urdf_tree import (
     read_tree,
 )
 
-_TURN = 2.0 * np.pi + 1e-6
-"""A whole turn [rad], and what rounding may add."""
 _MANY_TURNS = 60.0
 """Joint limits beyond this [rad] are degrees: no arm turns ten times."""
 _LONG = 20.0
@@ -316,7 +315,7 @@ def refuse_wrong_units(robot: Robot) -> None:
     """Refuse a robot whose numbers look like degrees or millimetres."""
     names, turning = robot.joint_names, ~robot.prismatic
     for key in ('alpha', 'theta', 'beta'):
-        _check(names, getattr(robot, key), _TURN, key, 'degrees in a radian field')
+        _check(names, getattr(robot, key), TURN, key, 'degrees in a radian field')
     for key in ('a', 'd'):
         _check(names, getattr(robot, key), _LONG, key, 'millimetres in a metre field')
     for key in ('lower', 'upper'):

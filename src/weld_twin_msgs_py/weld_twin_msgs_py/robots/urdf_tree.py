@@ -45,6 +45,8 @@ _KEPT = {
 }
 """Tags the reading needs and their attributes; the parser complains on stderr of any other."""
 MOVABLE = {'revolute', 'continuous', 'prismatic'}
+TURN = 2.0 * np.pi + 1e-3
+"""A whole turn [rad], and what rounding may add."""
 
 
 class Link(NamedTuple):
@@ -199,7 +201,12 @@ def _frame(origin: Any, where: str) -> Array:
     if origin is None:
         return np.eye(4)
     xyz = readonly(origin.xyz or (0.0, 0.0, 0.0), (3,), f'origin xyz of {where}')
-    roll, pitch, yaw = readonly(origin.rpy or (0.0, 0.0, 0.0), (3,), f'origin rpy of {where}')
+    roll, pitch, yaw = rpy = readonly(origin.rpy or (0.0,) * 3, (3,), f'origin rpy of {where}')
+    if abs(rpy).max() > TURN:
+        far = f'{rpy[abs(rpy).argmax()]:.6g}'
+        raise ModelError(
+            f'origin rpy of {where} is {far}, which looks like degrees in a radian field'
+        )
     return transform(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), xyz)
 
 

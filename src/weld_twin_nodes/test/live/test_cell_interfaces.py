@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The standard interfaces of a cell, over DDS."""
 
+from threading import Timer
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
@@ -21,9 +23,11 @@ from weld_twin_msgs_py.messages.topics import (
 from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
+from weld_twin_nodes.live.compensator import WITHDRAWN, Compensator
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.telling_node import HEALTH_EVERY
 from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
 
 pytestmark = pytest.mark.cells
@@ -64,7 +68,9 @@ def until_heard(cell, publisher, message_of, tap, what):
     cell.wait(told, what)
 
 
-def test_another_robot_told_while_the_twin_runs_is_not_taken_and_told(shared, run, tmp_path):
+def test_another_robot_told_while_nodes_run_is_told_and_nothing_is_corrected(
+    shared, run, tmp_path
+):
     texts = {}
     for name in ('ur5', 'ur10'):
         write_urdf(tmp_path / f'{name}.urdf', load(name))
@@ -73,14 +79,22 @@ def test_another_robot_told_while_the_twin_runs_is_not_taken_and_told(shared, ru
         )
     row, topic = ROBOT_DESCRIPTION, '/elsewhere'
     latched = shared.node.create_publisher(row.message_class(), topic, row.offered.to_rclpy())
-    latched.publish(texts['ur5'])
+    Timer(
+        1.5 * HEALTH_EVERY, latched.publish, [texts['ur5']]
+    ).start()  # a node waits for its robot
     node = run(ForwardKinematicsTwin, robot=topic)
+    model = tmp_path / 'model.yaml'
+    model.write_text('[{effect: joint_offset, joint: elbow_joint, offset: 1e-3}]')
+    corrects = run(Compensator, robot=topic, model=str(model), managed=False)
     health, before = HealthListener(shared.node), node.robot
     latched.publish(texts['ur10'])
     said, own = f'another robot is told on {topic} now', '/forward_kinematics_twin'
     shared.wait(lambda: any(said in text for _, text in health.told[own]), said)
     assert node.robot is before
+    withdrawn = corrects.health.lasting
+    shared.wait(lambda: said in withdrawn.get(WITHDRAWN, ''), 'nothing to be corrected')
     latched.publish(texts['ur5'])
+    shared.wait(lambda: WITHDRAWN not in withdrawn, 'the model to be used again')
     shared.wait(lambda: health.told[own][-1:] == [('ok', 'running')], 'the first robot again')
 
 

@@ -251,7 +251,8 @@ class CellNode(TellingNode):
 
     def look(self) -> None:
         """Look at what was taken for granted, and at who publishes."""
-        for intake in self.intakes():
+        # What takes messages in is made for the robot, and a node may wait for that.
+        for intake in () if self.arm is None else self.intakes():
             for sentence in intake.remarks:
                 self.remark(sentence)
             self.keep(BESIDE, intake.joints.beside.warning(self.carrying_nothing))

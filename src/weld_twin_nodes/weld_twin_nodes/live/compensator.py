@@ -28,6 +28,7 @@ from ..streams.supervision import ArmState, Moving, Supervision
 from .cell_node import CellNode
 from .goals import Decision, GoalAudit, GoalJudge, GoalRelay, Judged
 from .managed_node import ManagedNode
+from .robot_settings import CHANGED as ROBOT_CHANGED
 from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of, say_doubts
 from .run_node import run
 from .settings import Setting
@@ -282,7 +283,11 @@ class Compensator(ManagedNode):
                 'the process for exact looks has ended; this node makes them between poses'
             )
         if self._model is not None:
-            self._outdated = self._model.outdated(self.setting('max_model_age')) or self._twice()
+            self._outdated = (
+                self.health.lasting.get(ROBOT_CHANGED)
+                or self._model.outdated(self.setting('max_model_age'))
+                or self._twice()
+            )
         why = self._withdrawn() if self._active else ''
         if why != self._reported and why.partition(':')[0] != self._reported.partition(':')[0]:
             self.get_logger().warning(why or 'the model is used again')

@@ -280,6 +280,7 @@ def test_a_joint_that_goes_back_a_little_has_reversed(ur5, rng):
     case = SimpleNamespace(problem=problem, model=model, recordings=(run,), motions=[q])
     (one_way,) = (f.sentence for f in motion(case) if 'never' in f.sentence)
     assert "'elbow_joint'" not in one_way and "'wrist_1_joint'" in one_way
+    assert "and 'wrist_3_joint' never reverse; " in one_way
     q[300:] = q[300] - 0.05 * (t[300:] - t[300])[:, None] * [1, 1, 1, 1, 1, 0]
     (one_way,) = (f.sentence for f in motion(case) if 'never' in f.sentence)
     assert one_way.startswith("'wrist_3_joint' never reverses; ")

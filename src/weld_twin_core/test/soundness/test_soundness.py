@@ -113,11 +113,14 @@ def on_all_joints(robot, entries):
     return effects_from_list(out, robot)
 
 
-@pytest.mark.parametrize(('name', 'kind'), [('abb_irb120', moving), ('franka_panda', stations)])
-def test_ordinary_effects_raise_no_warning(name, kind):
+@pytest.mark.parametrize(
+    ('name', 'kind', 'how'),
+    [('abb_irb120', moving, {'seconds': 10.0}), ('franka_panda', stations, {'count': 60})],
+)
+def test_ordinary_effects_raise_no_warning(name, kind, how):
     rng = np.random.default_rng(11)
     robot = catalog.load(name)
-    motion = kind(robot, rng)
+    motion = kind(robot, rng, **how)
     for label, entries in ORDINARY.items():
         align = ('base', 'tool') if label in ('nothing', 'lag', 'spring', 'ripple') else ()
         seen = recorded(robot, motion, rng, on_all_joints(robot, entries))

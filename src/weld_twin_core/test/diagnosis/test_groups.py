@@ -40,22 +40,29 @@ ENTRIES = {True: KNOWN | AT_REST, False: KNOWN | MOVING}
 CASES = [(static, name) for static, entries in ENTRIES.items() for name in entries]
 
 
+def recording(q, *, static):
+    """Return what is measured of an arm that grows warmer, in motion with a force on its tool."""
+    t = 0.04 * np.arange(len(q))
+    warm = Signal(t, 20.0 + 6.0 * np.sin(0.3 * t))
+    force = None if static else Signal(t, 20.0 * np.cos(np.outer(t, 0.5 + 0.2 * np.arange(6))))
+    side = {'temperature': warm, 'wrench': force, 'wrench_frame': 'base'}
+    run = wt.Recording('run', wt.JointMotion(t, q, static=static), **side)
+    at = t[5:-5]  # what is late begins and ends otherwise
+    seen = wt.Twin(ROBOT).poses(run, at)
+    return run.with_measured(wt.Measurements(at, seen.position, seen.rotation))
+
+
 @pytest.fixture(scope='module')
 def asked():
-    """Return a problem at rest and one in motion, the model, and all groups of each."""
+    """Return a problem at rest and one of a fast and a slow motion, the model, and all their groups."""
+    turns = np.outer(0.04 * np.arange(150), 0.7 + 0.3 * np.arange(6)) + np.arange(6.0)
+    home = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+    postures = np.random.default_rng(2).uniform(-1.5, 1.5, (150, 6))
     out = {}
     for static in (True, False):
-        t, rng = 0.04 * np.arange(200), np.random.default_rng(2)
-        q = 0.5 * np.sin(np.outer(t, 0.7 + 0.3 * np.arange(6)) + np.arange(6.0))
-        q = rng.uniform(-1.5, 1.5, q.shape) if static else q + [0.1, -1.2, 1.5, -1.8, -1.5, 0.3]
-        warm = Signal(t, (20.0 + 6.0 * np.sin(0.3 * t)))
-        force = None if static else Signal(t, 20.0 * np.cos(np.outer(t, 0.5 + 0.2 * np.arange(6))))
-        side = {'temperature': warm, 'wrench': force, 'wrench_frame': 'base'}
-        run = wt.Recording('run', wt.JointMotion(t, q, static=static), **side)
-        at = t[5:-5]  # what is late begins and ends otherwise
-        seen = wt.Twin(ROBOT).poses(run, at)
-        problem = Problem((run.with_measured(wt.Measurements(at, seen.position, seen.rotation)),))
-        model = Model(ROBOT, (ROBOT.T_world_base,), (SPRING,))
+        each = [postures] if static else [home + 0.5 * np.sin(pace * turns) for pace in (1.0, 0.4)]
+        problem = Problem(tuple(recording(q, static=static) for q in each))
+        model = Model(ROBOT, (ROBOT.T_world_base,) * len(each), (SPRING,))
         out[static] = problem, model, list(all_groups(problem, model, problem.unit_scale()))
     return out
 
@@ -105,11 +112,22 @@ def test_columns_of_a_group_are_of_one_size_and_those_hardly_recorded_stay_small
 @pytest.mark.parametrize('static', [True, False])
 def test_growth_about_the_middle_of_the_warmth_takes_one_number(asked, static):
     problem, model, groups = asked[static]
-    (maker,) = problem.features(model)
-    middle = 0.5 * (maker.view.temperature.min() + maker.view.temperature.max())
+    warmth = np.concatenate([maker.view.temperature for maker in problem.features(model)])
+    middle = 0.5 * (warmth.min() + warmth.max())
     entry = {'effect': 'thermal_growth', 'coefficient': 1e-7, 'reference': float(middle)}
     row = moved(problem, model, effect_from_mapping(entry))
     single = [g.columns for g in groups if str(g) == 'temperature at base' and len(g.columns) == 1]
     assert min(np.linalg.norm(outside(row, span_of(c))) for c in single) < 3e-3 * np.linalg.norm(
         row
     )
+
+
+def test_what_carries_a_late_clock_on_does_here_what_it_does(asked):
+    problem, model, groups = asked[False]
+    (clock,) = (group for group in groups if group.at == 'clock')
+    parts = (
+        problem.effect_columns(problem.features(model), c, atoms=False) for c in clock.carriers
+    )
+    joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
+    span = span_of(problem.whitened(joined, problem.unit_scale()))
+    assert np.linalg.norm(outside(clock.columns, span)) < 1e-6 * np.linalg.norm(clock.columns)

@@ -78,7 +78,7 @@ def test_deviations_come_as_table_and_picture_too(tmp_path, table):
     ('words', 'sentence'),
     [
         (('--joint-columns', 'a,b,c,d,e,f'), "no column 'a'"),
-        (('--angle-unit', 'rad'), 'wrong robot'),
+        (('--angle-unit', 'rad'), 'with --angle-unit deg they fit'),
         (('--position-columns', 'x_measured'), 'needs 3 column names'),
         (('--skip-rows', '99'), 'names row 99'),
     ],

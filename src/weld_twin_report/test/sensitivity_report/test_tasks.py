@@ -45,11 +45,23 @@ def note_down(path, value):
 
 @pytest.fixture(scope='module')
 def setting():
-    """Return a study small enough to run four times."""
+    """Return a study small enough to run three times."""
     robot = catalog.load('ur5')
     tolerances = default_tolerances(robot, ('joint_offset', 'backlash'))
     path = default_seam(robot)
     return Setting(robot, tolerances, 'line', path, points=30, effort=Effort(64, 500, 4, 2))
+
+
+def plain(study):
+    return json.dumps(study, default=lambda a: a.tolist())
+
+
+@pytest.fixture(scope='module')
+def whole(setting, tmp_path_factory):
+    """Return the study as this process makes it, and the folder of its results."""
+    folder = tmp_path_factory.mktemp('whole')
+    with Runner(Here(), folder) as runner:
+        return plain(run_study(setting, runner)), folder
 
 
 @pytest.fixture
@@ -80,16 +92,11 @@ def test_this_process_works_while_others_do():
     assert (found, done) == ([3], ['drawn'])
 
 
-def studied(setting, pool):
-    with Runner(pool) as runner:
-        return json.dumps(run_study(setting, runner), default=lambda a: a.tolist())
-
-
 @pytest.mark.slow
-def test_a_study_is_identical_on_one_core_two_cores_and_a_dask_cluster(setting, loopback):
-    one = studied(setting, Cores(1))
-    assert studied(setting, Cores(2)) == one
-    assert studied(setting, Cluster(loopback)) == one
+def test_a_study_is_identical_here_on_two_cores_and_on_a_dask_cluster(setting, whole, loopback):
+    for pool in (Cores(2), Cluster(loopback)):
+        with Runner(pool) as runner:
+            assert plain(run_study(setting, runner)) == whole[0]
 
 
 def test_a_result_that_is_there_is_not_made_again(tmp_path):
@@ -104,22 +111,18 @@ def test_a_result_that_is_there_is_not_made_again(tmp_path):
     assert told[-1][:2] == (3, 3)
 
 
-def test_a_study_that_was_stopped_resumes_to_the_same_result(setting, tmp_path):
-    with Runner(Here(), tmp_path) as runner:
-        whole = run_study(setting, runner)
-    kept = sorted(tmp_path.iterdir())
+def test_a_study_that_was_stopped_resumes_to_the_same_result(setting, whole):
+    study, folder = whole
+    kept = sorted(folder.iterdir())
     for file in kept[::2]:
         file.unlink()
-    with Runner(Here(), tmp_path) as runner:
-        again = run_study(setting, runner)
-    assert sorted(tmp_path.iterdir()) == kept
-    plain = [json.dumps(r, default=lambda a: a.tolist()) for r in (whole, again)]
-    assert plain[0] == plain[1]
+    with Runner(Here(), folder) as runner:
+        assert plain(run_study(setting, runner)) == study
+    assert sorted(folder.iterdir()) == kept
 
 
-def test_a_study_is_as_it_was_kept(setting, kept):
-    with Runner(Here()) as runner:
-        study = json.loads(json.dumps(run_study(setting, runner), default=lambda a: a.tolist()))
+def test_a_study_is_as_it_was_kept(whole, kept):
+    study = json.loads(whole[0])
     kept('study', both_forms(study_page(study, None, ()), study))
 
 
@@ -130,7 +133,7 @@ def test_what_was_recorded_stands_beside_what_tolerances_make(setting, kept):
     recording = commanded.with_measured(Measurements(motion.t, real.position))
     asked = replace(setting, recording=recording, effort=Effort(16, 100, 2, 1))
     with Runner(Here()) as runner:
-        study = json.loads(json.dumps(run_study(asked, runner), default=lambda a: a.tolist()))
+        study = json.loads(plain(run_study(asked, runner)))
     rows = study['motions']['recorded']['local']['parameters']
     peak = next(row for row in rows if row['name'] == 'joint_offset.elbow_joint.offset')
     assert study['recorded']['max_m'] == pytest.approx(1e-3 * peak['S_analytic_peak_m'], rel=1e-3)

@@ -14,7 +14,7 @@ import re
 import numpy as np
 import pytest
 import yaml
-from command_line import done, refused
+from command_line import done, refused, weld_twin
 from diagnosis_cells import all_but
 from scipy.spatial.transform import Rotation
 
@@ -23,7 +23,6 @@ from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
 from weld_twin_lab.plant.tracker import Tracker
 from weld_twin_msgs_py.robots import read_urdf, write_urdf
-from weld_twin_nodes.cli import main
 
 QUARTER = 0.5 * np.pi
 COUNT, SIGMA = 60, 2e-5
@@ -51,10 +50,6 @@ TABLE = {
     'tool': {'xyz': [0.1, 0.05, 0.08], 'quat_xyzw': [0.0, 0.0, 0.6, 0.8]},
 }
 NAMES = ('turn', 'tilt', 'rail', 's', 'l', 'u', 'r')
-
-
-def commanded(*words):
-    return main([str(word) for word in words])
 
 
 def table_of(place, robot_errors, table_errors, seed):
@@ -160,15 +155,12 @@ def test_a_mistake_of_a_cell_has_its_name(tmp_path, mistake):
     table, cell = tmp_path / 'cell.csv', ROBOT | {'workpiece': TABLE}
     if mistake == 'another fixture':
         cell['workpiece'] = TABLE | {'tool': FIXTURE}
-    rows = list(csv.reader(table.open(encoding='utf-8')))
     if mistake == 'E1 in mm where m belong':
-        rows[0][3] = 'rail [m]'
-    with table.open('w', encoding='utf-8') as file:
-        csv.writer(file).writerows(rows)
+        table.write_text(table.read_text('utf-8').replace('rail [mm]', 'rail [m]'), 'utf-8')
     robot, bag, out = tmp_path / 'cell.yaml', tmp_path / 'bag', tmp_path / 'found'
     robot.write_text(yaml.safe_dump(cell), encoding='utf-8')
     done('import', table, '--robot', robot, '--out', bag)
-    assert commanded('diagnose', bag, '--robot', robot, '--out', out) == 3
+    assert weld_twin('diagnose', bag, '--robot', robot, '--out', out).code == 3
     (told,) = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))['unsound']
     assert (told['kind'], told['at']) == (MISTAKES[mistake][0], [MISTAKES[mistake][1]])
     if mistake == 'another fixture':

@@ -7,6 +7,7 @@ import json
 
 import numpy as np
 import pytest
+from command_line import done
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
@@ -15,7 +16,6 @@ from weld_twin_lab.programs.plain import tool_pose
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_msgs_py.robots import read_robot_yaml
-from weld_twin_nodes.cli import main
 
 ROBOT, ZERO, SCALE = load('abb_irb1600'), 8e-4, 1.5e-3
 KINDS = ('joint_offset', 'axis_parallelism', 'gear_ratio', 'link_length', 'link_twist')
@@ -37,9 +37,8 @@ def answer(tmp_path_factory):
     seen = Measurements(t, points + rng.normal(scale=2e-5, size=points.shape))
     given = Recording('cell', JointMotion(t, q, static=True), seen)
     write_recording(folder / 'rec', given, ROBOT.with_frames(tool=tool))
-    words = ['diagnose', folder / 'rec', '--robot', 'abb_irb1600', '--align', 'base,tool']
-    words += ['--out', folder / 'found', '--exclude-effect', *all_but(*KINDS)]
-    assert main([str(word) for word in words]) == 0
+    words = ('diagnose', folder / 'rec', '--robot', 'abb_irb1600', '--align', 'base,tool')
+    done(*words, '--exclude-effect', *all_but(*KINDS), '--out', folder / 'found')
     return folder / 'found'
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from command_line import done
 from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
@@ -25,7 +26,6 @@ from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.robots import read_robot_yaml, write_robot_yaml
-from weld_twin_nodes.cli import main
 from weld_twin_nodes.offline.exports import write_all
 
 KINDS = ('joint_offset', 'link_length', 'link_offset', 'joint_compliance')
@@ -63,19 +63,22 @@ def rms(robot, q, true):
     return np.sqrt(((own - true) ** 2).sum(axis=1).mean())
 
 
-@pytest.fixture(scope='module')
-def found(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('alone')
-    rng, q = postures(3, 50)
-    points = np.array([true_point(row) for row in q]) + rng.normal(scale=2e-5, size=(50, 3))
-    t = 5.0 * np.arange(50)
+def diagnosed(folder, q, points, *kinds):
+    """Return what a diagnosis leaves of points measured at postures."""
+    t = 5.0 * np.arange(len(q))
     given = Recording('cell', JointMotion(t, q, static=True), Measurements(t, points))
     write_recording(folder / 'rec', given, NOMINAL)
     write_robot_yaml(folder / 'robot.yaml', NOMINAL)
-    words = ['diagnose', folder / 'rec', '--robot', folder / 'robot.yaml', '--align', 'base,tool']
-    words += ['--out', folder / 'found', '--exclude-effect', *all_but(*KINDS)]
-    assert main([str(word) for word in words]) == 0
+    words = ('diagnose', folder / 'rec', '--robot', folder / 'robot.yaml', '--align', 'base,tool')
+    done(*words, '--exclude-effect', *all_but(*kinds), '--out', folder / 'found')
     return folder / 'found'
+
+
+@pytest.fixture(scope='module')
+def found(tmp_path_factory):
+    rng, q = postures(3, 50)
+    points = np.array([true_point(row) for row in q]) + rng.normal(scale=2e-5, size=(50, 3))
+    return diagnosed(tmp_path_factory.mktemp('alone'), q, points, *KINDS)
 
 
 def test_the_head_says_what_the_file_leaves_by_itself_on_postures_never_measured(found):
@@ -99,14 +102,22 @@ def test_the_head_says_what_the_file_leaves_by_itself_on_postures_never_measured
     assert own < np.sqrt(((one @ turn.T - other) ** 2).sum(axis=1).mean())
 
 
+def nominal_of(found):
+    return read_robot_yaml(found.parent / 'robot.yaml')
+
+
+def assert_same_tool(*twins):
+    """Assert that two twins take the tool to the same places at postures never measured."""
+    _, q = postures(12, 30)
+    motion = Recording('new', JointMotion(5.0 * np.arange(30), q, static=True))
+    one, other = (twin.poses(motion).position for twin in twins)
+    assert np.abs(one - other).max() < 2e-6
+
+
 def test_file_and_effects_together_are_the_whole_model(found):
     robot = read_robot_yaml(found / 'robot.yaml')
     both = Twin(robot, read_effects(found / 'robot_effects.yaml', robot))
-    whole = load_model(read_robot_yaml(found.parent / 'robot.yaml'), found / 'diagnosis.json')
-    _, q = postures(12, 30)
-    motion = Recording('new', JointMotion(5.0 * np.arange(30), q, static=True))
-    one, other = (twin.poses(motion).position for twin in (both, whole))
-    assert np.abs(one - other).max() < 2e-6
+    assert_same_tool(both, load_model(nominal_of(found), found / 'diagnosis.json'))
     changed = yaml.safe_load((found / 'robot_effects.yaml').read_text())
     assert {'joint_compliance', 'joint_offset'} <= {item['effect'] for item in changed}
 
@@ -114,31 +125,19 @@ def test_file_and_effects_together_are_the_whole_model(found):
 @pytest.fixture(scope='module')
 def uneven(tmp_path_factory):
     """An uneven gear whose name was taken out: curves without a formula stand in the model."""
-    folder = tmp_path_factory.mktemp('uneven')
     rng, q = postures(5, 40)
     real = q + np.outer(8e-4 * np.sin(4.0 * q[:, 2] + 0.4), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     points = np.array([tool_pose(NOMINAL, row, TOOL)[:3, 3] for row in real])
     points += rng.normal(scale=2e-5, size=points.shape)
-    t = 5.0 * np.arange(len(q))
-    given = Recording('cell', JointMotion(t, q, static=True), Measurements(t, points))
-    write_recording(folder / 'rec', given, NOMINAL)
-    write_robot_yaml(folder / 'robot.yaml', NOMINAL)
-    words = ['diagnose', folder / 'rec', '--robot', folder / 'robot.yaml', '--align', 'base,tool']
-    words += ['--out', folder / 'found', '--exclude-effect', *all_but(*KINDS, 'joint_curve')]
-    assert main([str(word) for word in words]) == 0
-    return folder / 'found'
+    return diagnosed(tmp_path_factory.mktemp('uneven'), q, points, *KINDS, 'joint_curve')
 
 
 def test_curves_without_a_formula_are_in_the_files_of_effects(uneven):
-    nominal = read_robot_yaml(uneven.parent / 'robot.yaml')
+    nominal = nominal_of(uneven)
     whole = load_model(nominal, uneven / 'diagnosis.json')
     assert {effect.name for effect in whole.effects} == {'joint_curve'}
     robot = read_robot_yaml(uneven / 'robot.yaml')
-    both = Twin(robot, read_effects(uneven / 'robot_effects.yaml', robot))
-    _, q = postures(12, 30)
-    motion = Recording('new', JointMotion(5.0 * np.arange(30), q, static=True))
-    one, other = (twin.poses(motion).position for twin in (both, whole))
-    assert np.abs(one - other).max() < 2e-6
+    assert_same_tool(Twin(robot, read_effects(uneven / 'robot_effects.yaml', robot)), whole)
     assert read_effects(uneven / 'effects.yaml', nominal)
 
 

@@ -17,17 +17,12 @@ from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
-from weld_twin_nodes.cli import main
 from weld_twin_nodes.cli.in_process import weld_twin
 
 OFFSET = 2e-3
 OTHERS = ('--exclude-effect', *(REGISTRY.keys() - {'joint_offset'}))
 """Kinds that need not be tried where it is about data that are wrong: the fewer, the sooner."""
 MODEL_FILES = ('effects.yaml', 'robot.yaml', 'robot.urdf', 'joint_offsets.csv')
-
-
-def run(*words):
-    return main([str(word) for word in words])
 
 
 def measured(seed, seconds=9.0, rate=60.0, velocity=False):
@@ -203,7 +198,7 @@ def test_the_model_of_another_robot_is_refused(found, bags, tmp_path, command):
 
 
 def test_a_sibling_under_the_same_name_is_refused(found, tmp_path):
-    run('export', found / 'diagnosis.json', '--robot', 'ur5', '--out', tmp_path / 'own.yaml')
+    done('export', found / 'diagnosis.json', '--robot', 'ur5', '--out', tmp_path / 'own.yaml')
     text = (tmp_path / 'own.yaml').read_text().replace('-0.39225', '-0.41')
     (tmp_path / 'sibling.yaml').write_text(text)
     words = ('export', found / 'diagnosis.json', '--robot', tmp_path / 'sibling.yaml')

@@ -143,9 +143,11 @@ class Cell:
         with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
             known = {}
             for topic, kind, k, message in self.rows:
-                if topic not in known:
-                    known[topic] = bag.add_connection(topic, kind, typestore=self.store)
-                bag.write(known[topic], (k + 10) * 10**8, self.store.serialize_cdr(message, kind))
+                if (topic, kind) not in known:
+                    connection = bag.add_connection(topic, kind, typestore=self.store)
+                    known[topic, kind] = connection
+                data = self.store.serialize_cdr(message, kind)
+                bag.write(known[topic, kind], (k + 10) * 10**8, data)
         return folder / 'bag'
 
 
@@ -238,6 +240,26 @@ def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
     bag, names = cell.write(tmp_path), TopicNames(joints='/dynamic_joint_states')
     np.testing.assert_allclose(read_recording(bag, ROBOT, names).joints.q, Q)
     assert 'joint states' not in ' '.join(bag_info(bag, names).missing)
+
+
+def test_a_topic_whose_type_was_changed_while_it_was_recorded_is_told(cell, tmp_path):
+    for k in range(N):
+        cell.joints(k)
+        pose = cell.placed(forward(ROBOT, Q[k]), 'Pose', 'position', 'orientation')
+        sure = {'pose': pose, 'covariance': np.full(36, 1e-10)}
+        kinds = (
+            ('PoseStamped', pose),
+            (
+                'PoseWithCovarianceStamped',
+                cell.make('geometry_msgs/msg/PoseWithCovariance', **sure),
+            ),
+        )
+        name, what = kinds[k < N // 2]
+        cell.add('/measured/tool_pose', f'geometry_msgs/msg/{name}', k, pose=what)
+    bag = cell.write(tmp_path)
+    with pytest.raises(DataError, match=r'Stamped and geometry_msgs.* one type alone'):
+        read_recording(bag, ROBOT)
+    assert not bag_info(bag).usable
 
 
 def prefixed(prefix):

@@ -238,7 +238,7 @@ def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Ro
             del roles[role]
         elif kind not in TYPES[role]:
             raise DataError(
-                f"topic '{topic}' has the type {kind}, but this use needs "
+                f"topic '{topic}' has the type {kind}, but this use needs one type alone: "
                 + ' or '.join(TYPES[role])
             )
     if Role.POSE in roles:

@@ -281,7 +281,7 @@ class BagReader:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.topics: dict[str, tuple[str, int]] = {}
-        """Message type and count of each topic."""
+        """Message type and count of each topic; of two types, both are named, and none is taken."""
         self.provenance: dict[str, Any] = {}
         """What the writer said about the bag's making; empty for bags made elsewhere."""
         self._packed = False
@@ -347,8 +347,12 @@ class BagReader:
             for connection in reader.connections:
                 if not all(isinstance(x, str) for x in (connection.topic, connection.msgtype)):
                     raise ValueError('name or type of a topic is no text')
-                count = self.topics.get(connection.topic, ('', 0))[1]
-                self.topics[connection.topic] = (connection.msgtype, count + connection.msgcount)
+                kind, count = self.topics.get(connection.topic, ('', 0))
+                kinds = kind.split(' and ') if count else []
+                if connection.msgtype not in kinds and (connection.msgcount or not count):
+                    kinds.append(connection.msgtype)
+                both = ' and '.join(kinds)
+                self.topics[connection.topic] = both, count + connection.msgcount
                 defined = connection.msgdef
                 self._definitions[connection.msgtype] = (
                     defined.data,

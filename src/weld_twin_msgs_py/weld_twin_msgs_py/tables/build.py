@@ -415,7 +415,10 @@ class _Reading:
                 raise DataError(sentence)
             self.said.append(f'{sentence}, and weld-twin diagnose says what is wrong')
             return
-        far = np.flatnonzero(off > _FAR * typical)
+        self._say_far(off, np.flatnonzero(off > _FAR * typical))
+
+    def _say_far(self, off: Array, far: NDArray[np.intp]) -> None:
+        """Say which rows stand out, by their distances [m]."""
         if far.size:
             worst = far[np.argsort(-off[far])]
             rows = [str(self.lines.index(self.cells.lines[k]) + 1) for k in worst[:_LISTED]]

@@ -189,7 +189,7 @@ def fewer_models(request):
             for name, size in sizes.items():
                 changed.setattr(f'weld_twin_core.diagnosis.{room}.{name}', size)
         changed.setattr(search, 'build', of_few)
-        yield
+        yield SMALLER
 
 
 @pytest.fixture(scope='session')

@@ -104,6 +104,25 @@ def test_what_is_chosen_anew_without_a_stretch_predicts_it(columns, kept):
     np.testing.assert_allclose(found, refitted(unseen, kept, extra, 0.3), atol=1e-7)
 
 
+def test_coordinates_wander_by_their_steps_over_what_noise_alone_makes_of_them():
+    """By inverses written out; what a search chooses counts as one coordinate of its own."""
+    unseen, rng = made_up(20, 5, seed=6, prior=30.0), np.random.default_rng(7)
+    moved = 0.1 * rng.normal(size=(5, unseen.labels.size))
+    unseen = replace(unseen, searched=lambda labels: {1: moved})
+    columns, prior = unseen.columns.written_out(), np.diag(unseen.precision)
+    whole, ratios = np.linalg.inv(columns @ columns.T + prior), []
+    for b in range(5):
+        seen = unseen.labels != b
+        left = np.linalg.inv(columns[:, seen] @ columns[:, seen].T + prior)
+        pulls = columns[:, seen] @ (unseen.residual - moved[b])[seen] - unseen.pull
+        ratios.append((left @ pulls) ** 2 / np.diag(left - whole))
+    wandered = np.mean(ratios, axis=0)
+    free = [row @ row - (columns @ row) @ whole @ (columns @ row) for row in moved]
+    expected = [wandered[part].max() for part in unseen.parts]
+    expected[1] = 4.0 * np.mean(free)
+    np.testing.assert_allclose(unseen.wandered(), expected, rtol=1e-6)
+
+
 def stairs_of(problem, model, scale):
     """Return the fit of the staircase of the elbow that all rows choose."""
     maker, joint = Maker(problem, problem.features(model), scale), 'elbow_joint'

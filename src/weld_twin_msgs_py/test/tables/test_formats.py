@@ -118,8 +118,11 @@ def curpos(turntable=True):
 
 def leica(sign=';'):
     """No form of Leica or FARO is known: points as a table with names, as anybody exports them."""
-    rows = [sign.join(f'{v:.4f}' for v in row) for row in 1e3 * POINT]
-    names = sign.join(['Point', 'X [mm]', 'Y [mm]', 'Z [mm]'])
+    rows, unit = [sign.join(f'{v:.4f}' for v in row) for row in 1e3 * POINT], 'mm'
+    if sign == 'German groups':
+        sign, unit, swapped = ';', 'um', str.maketrans(',.', '.,')
+        rows = [sign.join(f'{v:,.1f}'.translate(swapped) for v in row) for row in 1e6 * POINT]
+    names = sign.join(['Point', *(f'{axis} [{unit}]' for axis in 'XYZ')])
     return '\n'.join([names, *(f'P{k}{sign}{row}' for k, row in enumerate(rows, 1))]) + '\n'
 
 
@@ -167,7 +170,7 @@ def test_points_without_stamps_are_paired_row_by_row(tmp_path, sign):
     assert 'rows of both files are paired in their order' in said
 
 
-@pytest.mark.parametrize('sign', [';', '\t', ','])
+@pytest.mark.parametrize('sign', [';', '\t', ',', 'German groups'])
 def test_positions_of_fanuc_and_points_of_any_tracker_are_paired(tmp_path, sign):
     recording, said = read_two_tables(*both(tmp_path, curpos(), leica(sign)))
     assert recording.joints.static

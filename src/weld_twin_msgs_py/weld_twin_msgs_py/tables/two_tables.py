@@ -14,7 +14,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
 from .build import BEYOND, LAST_STAMP, Table, own_epoch, table_and_units, table_of
-from .cells import Cells, read_cells
+from .cells import Cells, number, read_cells
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import joint_angles
 from .unit_guess import later_rows, stamps
@@ -127,6 +127,14 @@ def _moving(
     return Table(recording, said_all)
 
 
+def _pointed(text: str) -> str:
+    """Return a number with a decimal comma, perhaps with thousands in groups, as one with a point."""
+    try:
+        return repr(number(text, ','))
+    except ValueError:
+        return text
+
+
 def _joined(log: Cells, seen: Cells, names: tuple[str, ...], q: Array, t: Array | None) -> Cells:
     """Return one table of the joints of one file and all but times of the other."""
     remaining = [
@@ -135,7 +143,7 @@ def _joined(log: Cells, seen: Cells, names: tuple[str, ...], q: Array, t: Array 
     rows = []
     for k, (joints, row) in enumerate(zip(q, seen.rows, strict=True)):
         stamp = [] if t is None else [repr(float(t[k]))]
-        others = [row[i].replace(',', '.') if seen.decimal == ',' else row[i] for i in remaining]
+        others = [_pointed(row[i]) if seen.decimal == ',' else row[i] for i in remaining]
         rows.append([*stamp, *(repr(float(v)) for v in joints), *others])
     header = [*([] if t is None else ['time [s]']), *names, *(seen.header[i] for i in remaining)]
     return Cells(log.path, header, rows, seen.lines, '.', [])

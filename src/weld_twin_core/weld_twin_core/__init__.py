@@ -68,7 +68,7 @@ if TYPE_CHECKING:  # what tools see; at run time `__getattr__` finds the same by
     from .recording import Signal as Signal
     from .twin.compensation import Compensation as Compensation
     from .twin.compensation import compensate as compensate
-    from .twin.corrected import corrected as corrected
+    from .twin.compensation import corrected as corrected
     from .twin.poses import Poses as Poses
     from .twin.stepping import LiveTwin as LiveTwin
     from .twin.twin import Twin as Twin

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 
 from .arm.rotation import moved, skew
 from .arrays import Array
-from .cameras.bodies import Bodies, bodies
-from .cameras.sightings import UNKNOWNS, Fitted, Lens, Sightings, Target
+from .cameras.sightings import UNKNOWNS, Bodies, Fitted, Lens, Sightings, Target, bodies
 from .errors import DataError
 from .pose_noise import Common, PoseNoise
 from .recording import Measurements, Recording
@@ -220,7 +219,6 @@ class _Point:
 
     @property
     def cost(self) -> float:
-        """Return the weighted squares and what priors add."""
         remaining = self.weight[:, None] * self.rows[0]
         return float((remaining**2).sum() + (self.state.unknowns**2).sum())
 
@@ -251,7 +249,6 @@ class _Point:
         return _Taken(roots, taken[..., -1], taken[..., :-1], normal[:-1, :-1], normal[:-1, -1])
 
     def stepped(self, damping: float) -> _Point:
-        """Return the place a damped step away."""
         own = self.reduced
         damped = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
         step = np.asarray(np.linalg.solve(damped, own.rest - self.state.unknowns), dtype=float)
@@ -412,7 +409,6 @@ def _descended(here: _Point) -> _Point:
 
 
 def _result(point: _Point, noise: float) -> _Adjusted:
-    """Return poses with what is not sure about them."""
     own, state = point.reduced, point.state
     weak = np.linalg.cond(own.roots) > _SINGULAR
     if weak.any():

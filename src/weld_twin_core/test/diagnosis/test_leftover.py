@@ -12,7 +12,7 @@ from scipy.stats import chi2, multivariate_normal
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
 from weld_twin_core.diagnosis.predicting.leftover import Predicted, _likelihood, leftover
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.reversals import just_turned
+from weld_twin_core.twin.goal_motion import just_turned
 
 COUNT, JOINTS, REGIONS = 768, 3, 6
 NOISE, LEVER = 2e-5, 0.5

@@ -11,8 +11,7 @@ import pytest
 
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import bulk_kernel as bulk
-from weld_twin_core.arm.bulk.bulk_kernel import _LENGTHS, BulkKernel, kernel_of
-from weld_twin_core.arm.bulk.half_angle import HalfAngle, aligned
+from weld_twin_core.arm.bulk.bulk_kernel import _LENGTHS, BulkKernel, HalfAngle, aligned, kernel_of
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.single_pose import SinglePose
 from weld_twin_core.errors import ModelError

@@ -12,7 +12,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import effect_from_mapping, effects_from_list
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.corrected import corrected
+from weld_twin_core.twin.compensation import corrected
 from weld_twin_core.twin.twin import Twin
 
 G = 9.80665

@@ -12,8 +12,7 @@ from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.recording import JointMotion, Recording, Signal
-from weld_twin_core.twin.compensation import compensate
-from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_core.twin.compensation import compensate, corrected, joint_offsets
 from weld_twin_core.twin.twin import Twin
 
 

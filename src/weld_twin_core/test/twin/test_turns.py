@@ -19,10 +19,9 @@ from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.goal_correction import Start, corrected_goal
-from weld_twin_core.twin.goal_motion import Goal
+from weld_twin_core.twin.goal_motion import Goal, just_turned
 from weld_twin_core.twin.posterior import Posterior, pose_covariances
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_core.twin.reversals import just_turned
 
 HOME = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
 WIDTH = 7e-4

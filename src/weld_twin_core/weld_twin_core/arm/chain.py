@@ -386,3 +386,27 @@ def chain_jacobian(robot: Robot, chain: Frames, shift: Shift = NO_SHIFT) -> Arra
     """Return the Jacobian, shape (..., 6, n), of frames already at hand."""
     columns = [column(robot, chain, ('q', i), shift) for i in range(robot.n)]
     return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
+
+
+_FLAT = 0.02
+"""Share of the arm's length that the second axis lies beyond the foot, from which it tells the way."""
+
+
+def up(robot: Robot) -> Array:
+    """
+    Return the direction against gravity in the base frame of the rows, shape (3,).
+
+    The z axis of the first row does not tell it: a URDF may let that point down, as KUKA's do.
+    """
+    weight = float(np.linalg.norm(robot.gravity))
+    return np.asarray(-robot.gravity / weight) if weight > 0.0 else np.array([0.0, 0.0, 1.0])
+
+
+def rising(robot: Robot) -> float:
+    """Return 1 where the arm rises from its foot along z of its first row, -1 where against it."""
+    if robot.n > 1 and not robot.prismatic[0]:
+        chain = frames(robot.with_frames(base=np.eye(4)), np.zeros(robot.n))
+        rise = float(chain.rows[1].z_point[2])
+        if abs(rise) > _FLAT * float(np.abs(robot.a).sum() + np.abs(robot.d).sum()):
+            return float(np.sign(rise))
+    return -1.0 if robot.T_base_origin[2, 2] < -0.5 else 1.0

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
-from .chain import Frames, frames
-from .mounting import rising, up
+from .chain import Frames, frames, rising, up
 from .robot import Robot
 
 _THICK = 0.05

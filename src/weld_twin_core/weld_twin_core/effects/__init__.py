@@ -42,10 +42,9 @@ from .loads import HosePull, Payload
 from .quantization import Quantization
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
 from .rubbing import Friction, Hysteresis
-from .servo_lag import ServoLag
+from .servo_lag import ServoLag, Vibration
 from .thermal import LinkWarmUp, ThermalGrowth
 from .transmission_ripple import TransmissionRipple
-from .vibration import Vibration
 from .view import Parameter, Plausible, Stage, View
 from .wear import Wear
 

@@ -77,7 +77,6 @@ def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
 
 
 def _each(robot: Robot, effect: Effect) -> list[Plausible]:
-    """Return what every fit coordinate may be."""
     if isinstance(effect, TransmissionRipple):  # sine and cosine share the amplitude
         wave = plausible(robot, effect.name, 'amplitude', effect.site)
         one = replace(wave, sd=wave.sd / np.sqrt(2.0), low=-wave.high)

@@ -480,7 +480,6 @@ class _System:
 
 
 def _symmetric(blocks: list[list[Array]]) -> Array:
-    """Return a symmetric matrix of its blocks below the diagonal."""
     sizes = [np.atleast_2d(row[-1]).shape[0] for row in blocks]
     starts = np.concatenate([[0], np.cumsum(sizes)])
     out = np.zeros((starts[-1], starts[-1]))

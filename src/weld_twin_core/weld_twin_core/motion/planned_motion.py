@@ -184,11 +184,9 @@ class _JointLine:
         return self.torch.poses(self.path.sample(s), self._first)
 
     def _seen(self, s: Array) -> Array:
-        """Return the same as the arm's base sees them."""
         return self.axes.seen(self.poses(s), self._external(s))
 
     def motion(self, timing: Timing) -> tuple[JointMotion, float]:
-        """Return the motion and its largest error of closure."""
         poses = self._seen(timing.s)
         q, _ = polish(self.robot, self._spline(timing.s), poses)
         rate = self._spline(timing.s, 1)

@@ -19,7 +19,6 @@ How far is the tool off, at most, in 95 of 100 arms with the default tolerances?
 
 """
 
-from .distribution import Distribution
 from .evaluate import Model, draws_at, model
 from .indices import (
     MorrisDesign,
@@ -30,10 +29,19 @@ from .indices import (
     sobol_indices,
 )
 from .local import LocalSensitivity, local_sensitivity
-from .seam_study import Outcomes, Study, planned_study, recorded_study, study_of_plan
-from .stack import ToleranceStack, WeldTolerance, probabilities, tolerance_stack
+from .seam_study import (
+    Outcomes,
+    Study,
+    ToleranceStack,
+    WeldTolerance,
+    planned_study,
+    probabilities,
+    recorded_study,
+    study_of_plan,
+    tolerance_stack,
+)
 from .sweep import Sweep, default_values, sweep
-from .tolerance import Tolerance, default_tolerances, scaled, tolerances_from_list
+from .tolerance import Distribution, Tolerance, default_tolerances, scaled, tolerances_from_list
 from .trajectory_advice import (
     PlacementResult,
     ProfileResult,

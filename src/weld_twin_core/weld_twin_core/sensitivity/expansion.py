@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..arm.chain import jacobian
 from ..arrays import Array
 from ..effects import REGISTRY, Effect, Stage
-from ..twin.memory import Picker, in_series, run_all
+from ..twin.stages import Picker, in_series, run_all
 from ..twin.twin import Twin
 from .seam_study import Outcomes, Study, joined, outcomes
 from .tolerance import Tolerance, with_draws

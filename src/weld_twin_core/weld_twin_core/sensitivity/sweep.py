@@ -141,7 +141,6 @@ class Sizes:
 
 
 def _sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
-    """Return the effects of every source of the combined scenario."""
     size = sizes or Sizes()
     joints = robot.joint_names
     return {

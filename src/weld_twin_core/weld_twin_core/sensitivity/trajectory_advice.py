@@ -282,7 +282,6 @@ class _Search:
         return rms_over_arc(study, self.scatter.deviation(study))
 
     def result(self, label: str, values: Array) -> PlacementResult:
-        """Return the placement with its numbers."""
         study, solution = self.study(values)
         return PlacementResult(
             label,

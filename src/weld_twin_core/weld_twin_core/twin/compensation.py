@@ -1,26 +1,31 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Commands that put the real tool where the nominal model wanted it.
+Commands that put the real tool where the nominal model wanted it, and models that know better.
 
 Newton on the joint commands, all samples at once, with the nominal Jacobian: effects are small,
 so every round takes away all but some thousandths of what is left. Effects with memory couple
 the samples; for them the rounds are a fixed-point iteration on the whole motion, and a round that
 does not help (a resonance answers too much) is taken back and tried with half the step.
+
+Controllers that load numbers only get the constant effects written into the robot model.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ..arm.chain import chain_jacobian, frames
+from ..arm.chain import base_frame, chain_jacobian, frames, root_frame, tool_frame
 from ..arm.robot import Robot
-from ..arm.rotation import missing, moved
+from ..arm.rotation import missing, moved, transform
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect, Stage
+from ..effects.geometry import ChannelError, FrameError
+from ..effects.loads import Payload
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion, Recording
 from .twin import Twin
@@ -178,7 +183,7 @@ def rms_of(error: Array) -> float:
 
 
 _BEYOND_COMMANDS = frozenset(
-    {
+    [
         'measurement_scale',
         'measurement_noise',
         'refraction',
@@ -187,7 +192,7 @@ _BEYOND_COMMANDS = frozenset(
         'setup_step',
         'setup_settling',
         'instrument_knock',
-    }
+    ]
 )
 """Effects of the measurement, or new in every run: they do nothing to a motion to come."""
 _ROUNDING = 'quantization'
@@ -202,3 +207,84 @@ def commandable(effect: Effect) -> bool:
 def acts(effect: Effect) -> bool:
     """Tell whether an effect moves the tool on a motion to come, which nobody measures."""
     return effect.name not in _BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
+
+
+def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Effect, ...]]:
+    """
+    Return the robot with the constant effects in its own numbers, and the effects left over.
+
+    Joint offsets go into ``theta`` (``d`` of a prismatic joint), link errors into their rows,
+    base and tool errors into the frames, a payload to the one declared. Everything else that
+    depends on the motion, load or temperature stays an effect.
+
+    Parameters
+    ----------
+    robot : Robot
+    effects : sequence of Effect
+
+    Raises
+    ------
+    ModelError
+        The robot has no joint that an effect names.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> longer = wt.effects.LinkLength('elbow_joint', da=0.001)
+    >>> play = wt.effects.Backlash('elbow_joint', width=5e-4)
+    >>> robot, left = wt.corrected(wt.load('ur5'), [longer, play])
+    >>> print(round(robot.a[2] - wt.load('ur5').a[2], 6), 'm;', left[0].name, 'is left')
+    0.001 m; backlash is left
+
+    """
+    remaining = []
+    for effect in effects:
+        if isinstance(effect, ChannelError):
+            robot = _with_row(robot, effect)
+        elif isinstance(effect, FrameError):
+            robot = _with_frame(robot, effect)
+        elif isinstance(effect, Payload) and robot.payload_mass + float(effect.mass) > 0.0:
+            robot = _with_payload(robot, effect)
+        else:
+            remaining.append(effect)
+    return robot, tuple(remaining)
+
+
+def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
+    """Return how much further than its reading each joint stands, (n,), as controllers add it."""
+    out = np.zeros(robot.n)
+    for effect in effects:
+        if isinstance(effect, ChannelError) and effect.channel == 'q':
+            out[robot.index(str(effect.site))] += _value(effect)
+    return out
+
+
+def _value(effect: Effect) -> float:
+    return float(getattr(effect, effect.parameters[0].name))
+
+
+def _with_row(robot: Robot, effect: ChannelError) -> Robot:
+    k = robot.index(str(effect.site))
+    key = effect.channel
+    if key == 'q':
+        key = 'd' if robot.prismatic[k] else 'theta'
+    values = np.array(getattr(robot, key))
+    values[k] += _value(effect)
+    change: dict[str, Any] = {key: values}
+    return replace(robot, **change)
+
+
+def _with_frame(robot: Robot, effect: FrameError) -> Robot:
+    vector = effect.vector()
+    shift = {(effect.channel, k): vector[k] for k in range(6)}
+    if effect.channel == 'base':
+        return robot.with_frames(base=transform(*base_frame(robot, shift)))
+    if effect.channel == 'root':
+        return replace(robot, T_root_base=transform(*root_frame(robot, shift)))
+    return robot.with_frames(tool=transform(*tool_frame(robot, shift)))
+
+
+def _with_payload(robot: Robot, effect: Payload) -> Robot:
+    mass = robot.payload_mass + float(effect.mass)
+    moment = robot.payload_mass * robot.payload_com + effect.mass * np.asarray(effect.com)
+    return replace(robot, payload_mass=mass, payload_com=moment / mass)

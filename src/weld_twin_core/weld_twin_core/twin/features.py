@@ -20,8 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
 from ..recording import JointSignal, Recording
-from .memory import Picker
-from .stages import Evaluation, load_torque
+from .stages import Evaluation, Picker, load_torque
 from .twin import Twin
 
 _SLOW = 0.03

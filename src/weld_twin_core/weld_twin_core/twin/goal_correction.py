@@ -25,11 +25,20 @@ from ..errors import DataError
 from ..recording import JointMotion, Recording
 from .compensation import commandable, compensate, rms_of
 from .features import Features
-from .goal_motion import Course, Goal, course, fine_times
+from .goal_motion import (
+    Course,
+    Goal,
+    approached,
+    course,
+    fine_times,
+    is_play,
+    just_turned,
+    play_steps,
+    spread,
+)
 from .posterior import Drawn, pose_covariances
 from .program_correction import BETTER, NOTHING, accuracy, too_large
 from .program_model import ProgramModel
-from .reversals import approached, is_play, just_turned, play_steps, spread
 from .twin import Twin
 
 _SHARES = (0.125, 0.25, 0.5)

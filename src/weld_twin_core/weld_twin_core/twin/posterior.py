@@ -32,8 +32,8 @@ from .compensation import commandable
 from .directions import Directions, Discrepancy, Where
 from .domain import Domain
 from .features import Features, jumps, with_expected_effort
+from .goal_motion import just_turned
 from .poses import Poses
-from .reversals import just_turned
 from .twin import Twin
 
 _DRAWS = 400

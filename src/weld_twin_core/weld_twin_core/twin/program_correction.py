@@ -290,7 +290,6 @@ class _Work(NamedTuple):
     def result(
         self, moved: MoveProgram, remaining: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
-        """Return the correction with everything reported about it."""
         before, after, ways, drawn = [], [], [], []
         samples = sum(piece.motion.t.size for piece in self.travel.pieces)
         parts = int(np.clip(_LOOKS // max(samples, 1), 1, _PARTS))

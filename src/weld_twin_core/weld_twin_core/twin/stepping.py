@@ -16,9 +16,8 @@ from ..arm.single_pose import SinglePose
 from ..arrays import Array
 from ..effects.effect import View
 from ..errors import DataError
-from .memory import added, in_series
 from .poses import Poses, posed
-from .stages import EffectStages
+from .stages import EffectStages, added, in_series
 
 _BESIDE = ('tau', 'pose')
 """Channels that act through the joints and behind the chain, not within it."""

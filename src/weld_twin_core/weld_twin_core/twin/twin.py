@@ -16,9 +16,8 @@ from ..arm.channels import Channel, Shift
 from ..arrays import Array
 from ..effects.effect import Parameter, Stage, View
 from ..recording import Recording
-from .memory import Picker, Tangent, indexed, rates, run_all
 from .poses import Poses
-from .stages import EffectStages, Evaluation
+from .stages import EffectStages, Evaluation, Picker, Tangent, indexed, rates, run_all
 from .stepping import LiveTwin
 
 __all__ = ['LiveTwin', 'Poses', 'Twin']

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
-from weld_twin_lab.belief.judged import complete, kept, sets_hold
+from weld_twin_lab.belief.judged import VISIBLE, complete, kept, sets_hold, shown, whole
 from weld_twin_lab.belief.trial import (
     CROWDED,
     MOST,
@@ -17,7 +17,6 @@ from weld_twin_lab.belief.trial import (
     lot_of,
     tried,
 )
-from weld_twin_lab.belief.truth import VISIBLE, shown, whole
 
 PLAY, LINK, ZERO = (
     ('backlash', 'elbow_joint'),

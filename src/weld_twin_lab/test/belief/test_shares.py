@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_lab.belief.truth import true_shares
+from weld_twin_lab.belief.judged import true_shares
 from weld_twin_lab.blind.blind_cell import deviation, draw_cell, floor, take
 from weld_twin_lab.blind.making import SealedCase
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 
 from weld_twin_lab.belief import trial
-from weld_twin_lab.belief.judged import kept
+from weld_twin_lab.belief.judged import HALF, kept, there
 from weld_twin_lab.belief.trial import EVERYWHERE, diagnosed
-from weld_twin_lab.belief.truth import HALF, there
 from weld_twin_lab.blind.cause_sizes import site
 
 pytest.importorskip('mujoco')

@@ -13,6 +13,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.effects import REGISTRY, effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.twin import Twin
+from weld_twin_lab.blind.blind_cell import motion
 from weld_twin_lab.blind.cause_sizes import (
     CONSTRUCTIONS,
     FAMILIES,
@@ -24,8 +25,7 @@ from weld_twin_lab.blind.cause_sizes import (
     scaled,
 )
 from weld_twin_lab.blind.making import KINDS, STRATA, Lot, lots
-from weld_twin_lab.blind.measures import correlation, rigid, rms
-from weld_twin_lab.blind.recorded_motion import motion
+from weld_twin_lab.blind.scoring import correlation, rigid, rms
 
 pytest.importorskip('mujoco')
 

@@ -7,8 +7,15 @@ import pytest
 from blind_verdicts import diagnosis, offset, truth
 from scipy.stats import binomtest
 
-from weld_twin_lab.blind.measures import bootstrap, brier, calibration_error, share
-from weld_twin_lab.blind.scoring import judge, measures, page
+from weld_twin_lab.blind.scoring import (
+    bootstrap,
+    brier,
+    calibration_error,
+    judge,
+    measures,
+    page,
+    share,
+)
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
 BASE = ('base_pose', None)

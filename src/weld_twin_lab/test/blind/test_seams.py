@@ -6,13 +6,13 @@ import numpy as np
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import PathError
-from weld_twin_lab.blind import recorded_motion
+from weld_twin_lab.blind import blind_cell
 
 SPAN, RATE = 20.0, 50.0
 
 
 def test_a_seam_that_would_take_too_long_is_drawn_again(monkeypatch):
-    refused, plan = [], recorded_motion.plan
+    refused, plan = [], blind_cell.plan
 
     def watched(*args, **options):
         try:
@@ -21,10 +21,10 @@ def test_a_seam_that_would_take_too_long_is_drawn_again(monkeypatch):
             refused.append(str(error))
             raise
 
-    monkeypatch.setattr(recorded_motion, 'plan', watched)
+    monkeypatch.setattr(blind_cell, 'plan', watched)
     robot = catalog.load('abb_irb120')
-    q = recorded_motion.seam_motion(robot, SPAN, RATE, np.random.default_rng(3))
-    most = round(recorded_motion.LONGEST * SPAN * RATE)
+    q = blind_cell.seam_motion(robot, SPAN, RATE, np.random.default_rng(3))
+    most = round(blind_cell.LONGEST * SPAN * RATE)
     assert any(f'samples, and {most:,} are the most' in sentence for sentence in refused)
     assert 0.5 * SPAN * RATE < len(q) < most
     robot.check_positions(q)

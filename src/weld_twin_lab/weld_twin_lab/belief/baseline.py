@@ -28,9 +28,9 @@ from weld_twin_nodes.offline.task_pool import Task
 from ..blind.blind_cell import take
 from ..blind.cause_sizes import Site
 from ..blind.making import MOTIONS_OF, truth_of
-from ..blind.measures import Estimate, bootstrap, calibration_error, share
-from ..blind.scoring import CONFIDENT, is_sure
+from ..blind.scoring import CONFIDENT, Estimate, bootstrap, calibration_error, is_sure, share
 from ..study import Study, require_simulator, tabled
+from .judged import Levels, alike_by_structure, levels_of, whole
 from .trial import MOST as CAUSES
 from .trial import (
     SEVERAL,
@@ -44,7 +44,6 @@ from .trial import (
     tried,
     write_rows,
 )
-from .truth import Levels, alike_by_structure, levels_of, whole
 
 MOST = 2 * CAUSES
 """Effects of a model that are kept; more are many small errors."""
@@ -282,7 +281,6 @@ class GrowingStep(NamedTuple):
 
     @property
     def fell(self) -> bool:
-        """Return whether it lost much."""
         return self.after < self.before - FALL
 
 

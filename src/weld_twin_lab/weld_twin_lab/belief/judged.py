@@ -5,20 +5,377 @@ What each level of an answer was worth: examples to learn belief from.
 
 An answer is right as the blind check judges it; besides, each member of a set too wide for a name
 must predict the sealed recording as the cause at work does, unless the kinematics make them one error.
+
+Where causes of a case sit, which of them show, and what share each has, the plant alone says. Causes
+in the library have their place and dependence from there. Constant errors that the kinematics of the
+arm makes one and the same error may be told at any of their places.
+
+A cause is taken out of the truth; all others and the frames may then change so that the recordings look
+as they did. What still differs, there and on another motion, shows. On the recordings too: a fit that
+has to reach far beyond them differs elsewhere for no cause. Where an arm is off by a little everywhere,
+every name is at work. So a cause is asked how far it says that it moves the tool on a motion that was
+not recorded, beside what fitted frames take up, and how much of that the errors named really do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import matrix_from_quaternion
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import Diagnosis
+from weld_twin_core.diagnosis.algebra.motions import same_error
 from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
+from weld_twin_core.diagnosis.result import Cause as Told
+from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.registry import REGISTRY
 
+from ..blind.blind_cell import BlindCell, Take, as_recording, deviation, exact, floor, record
+from ..blind.cause_sizes import SIZES, Cause, Site, site
+from ..blind.making import SealedCase
 from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge
-from .truth import FEW, HALF, LARGE, alike_by_structure, levels_of, numbers, whole
-from .truth import right as right_everywhere
+from ..plant.exponentials import PlantRecording
+
+HERE = 'its joint'
+OUTSIDE_LEVELS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    'bearing_tilt': ((HERE,), ('angle',)),
+    'station_step': (('instrument', 'base'), ('time',)),
+    'tool_slip': (('tool',), ('time',)),
+    'quadratic_scale': (('instrument',), ('place',)),
+    'column_bend': (('base',), ('time', 'temperature')),
+    'stick_slip': ((HERE,), ('direction', 'speed')),
+    'friction_wander': ((HERE,), ('direction', 'time')),
+    'loaded_play': ((HERE,), ('load', 'direction')),
+    'dress_pack': ((HERE,), ('angle',)),
+}
+"""Places and dependences of the causes outside the library; the first is the one meant."""
+ALSO: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    'drift': (('base', 'instrument'), ('time',)),
+    'payload': (('load', 'tool'), ('load',)),
+    'clock_rate': (('clock',), ('time', 'speed')),
+    'gear_ratio_by_direction': ((HERE,), ('direction', 'angle')),
+    'hose_pull': (('load', 'tool'), ('load',)),
+}
+"""The same for causes in the library whose place has more than one right word."""
+LAGGING = 'equal lag'
+"""Construction in which every joint lags alike: the clock is late, to whoever measures."""
+
+
+class Levels(NamedTuple):
+    """Right words for the place and for the dependence of one cause."""
+
+    places: frozenset[str]
+    dependences: frozenset[str]
+
+
+def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
+    """Return the right words for every cause of a truth of `making.truth_of`, or those kept with it."""
+    if 'levels' in truth:
+        return [Levels(frozenset(at), frozenset(on)) for at, on in truth['levels']]
+    out = [_levels(str(effect), joint, str(truth['robot'])) for effect, joint in truth['sites']]
+    if truth['construction'] == LAGGING:
+        out = [Levels(own.places | {'clock'}, own.dependences) for own in out]
+    return out
+
+
+def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
+    """Return the constant errors that are always the same error as one, itself included."""
+    return frozenset(_alike(robot, site))
+
+
+def numbers(site: Site) -> int:
+    """Return how many numbers a family of the library has."""
+    kind = REGISTRY.get(site[0])
+    return sum(max(p.size, 1) for p in kind.parameters) if kind is not None else 0
+
+
+@lru_cache(maxsize=1024)
+def _alike(name: str, site: Site) -> tuple[Site, ...]:
+    effect, joint = site
+    kind = REGISTRY.get(effect)
+    if kind is None or not _constant(kind):
+        return (site,)
+    robot = catalog.load(name)
+    own = _built(kind, joint)
+    others = [other for other in _constants(robot) if same_error(robot, own, other)]
+    return tuple({site, *((other.name, other.site) for other in others)})
+
+
+@lru_cache(maxsize=1024)
+def _levels(effect: str, joint: str | None, robot: str) -> Levels:
+    if effect in OUTSIDE_LEVELS or effect in ALSO:
+        words, dependences = {**OUTSIDE_LEVELS, **ALSO}[effect]
+        own = {str(joint) if word == HERE else word for word in words}
+        return Levels(frozenset(own), frozenset(dependences))
+    kind = REGISTRY[effect]
+    places = {_built(REGISTRY[e], j).at for e, j in _alike(robot, (effect, joint))}
+    return Levels(frozenset(places), frozenset({kind.traits.depends_on}))
+
+
+def _constant(kind: type[Effect]) -> bool:
+    return kind.traits.cause and kind.traits.depends_on == 'constant'
+
+
+def _constants(robot: Robot) -> Iterator[Effect]:
+    for kind in REGISTRY.values():
+        if _constant(kind):
+            joints: Sequence[str | None] = (
+                robot.joint_names if kind.of in ('joint', 'link') else (None,)
+            )
+            yield from (_built(kind, joint) for joint in joints)
+
+
+def _built(kind: type[Effect], joint: str | None) -> Any:
+    return kind(**({'joint': joint} if kind.of in ('joint', 'link') else {}))
+
+
+VISIBLE = 25.0
+"""Rise of chi-square without a cause from which on it shows: five standard deviations."""
+FEW = frozenset({'double', 'triple'})
+"""Kinds of cases with two or three causes."""
+
+
+class Whole(NamedTuple):
+    """What an answer names, against what is at work."""
+
+    asked: tuple[frozenset[Site], ...]
+    """Every visible cause that the library holds, as all that is the same error on any motion."""
+    named: tuple[bool, ...]
+    """Whether each of these is told, alone or in a small set."""
+    right: bool
+    """All of these are named, nothing else is, and where a visible cause was taken out of the
+    library, something is said to be left."""
+
+
+def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
+    """Return an answer of any schema held against its truth, which has what every cause shows."""
+    at_work = [alike_by_structure(truth['robot'], (e, j)) for e, j in truth['sites']]
+    out = [
+        e in truth['excluded'] or not any(own in REGISTRY for own, _ in alike)
+        for (e, _), alike in zip(truth['sites'], at_work, strict=True)
+    ]
+    seen = [chi >= VISIBLE for chi in truth['shown']]
+    asked = tuple(
+        own for own, gone, shows in zip(at_work, out, seen, strict=True) if shows and not gone
+    )
+    groups = [{(s['effect'], s['joint']) for s in g} for g in verdict['indistinguishable']]
+    small = [group for group in groups if len(group) <= WIDEST]
+    named = tuple(any(own & group for group in small) for own in asked)
+    every = frozenset[Site]().union(*at_work)
+    # A set that holds what was taken out tells it, by what no motion tells from it.
+    foreign = any(
+        gone and shows and not any(own & group for group in groups)
+        for own, gone, shows in zip(at_work, out, seen, strict=True)
+    )
+    nothing = 'none' if not any(seen) else ''
+    said = _left(verdict) if foreign else verdict['status'] in (*NAMING, nothing)
+    return Whole(asked, named, all(named) and said and all(group & every for group in groups))
+
+
+def _left(verdict: Mapping[str, Any]) -> bool:
+    causes: Sequence[Mapping[str, Any]] = verdict['causes']
+    return verdict['status'] == 'unknown' or any(cause.get('rest') for cause in causes)
+
+
+STEP = 0.1
+"""Share of a parameter by which it is changed for its column; angles by as much [rad]."""
+TURNING = {'transmission_ripple': ('phase',), 'bearing_tilt': ('phase',)}
+"""Parameters beside the sizes that bend a cause."""
+
+
+def shown(case: SealedCase) -> list[float]:
+    """
+    Return for each cause by how much chi-square rises without it, the least of both kinds of motion.
+
+    Causes are taken as linear in their parameters about the truth.
+    """
+    positions = replace(case.cell.tracker, orientation=False)
+    cell = replace(case.cell, align=(), tracker=positions)
+    takes = (case.train, *case.also, case.test)
+    whole = moved(cell, case.causes, takes)
+    frames = frame_columns(cell, takes, case.cell.align)
+    columns = [
+        [(moved(cell, new, takes) - whole) / STEP for new in changed(case.causes, k)]
+        for k in range(len(case.causes))
+    ]
+    unseen = np.arange(whole.size) >= whole.size - moved(cell, (), takes[-1:]).size
+    out = []
+    for k in range(len(case.causes)):
+        others = [own for j, part in enumerate(columns) if j != k for own in part]
+        design = np.array([*others, *frames]).T
+        gone = whole - moved(cell, [*case.causes[:k], *case.causes[k + 1 :]], takes)
+        remaining = gone - design @ fitted(design[~unseen], gone[~unseen]) if design.size else gone
+        out.append(min(float((remaining[part] ** 2).sum()) for part in (unseen, ~unseen)))
+    return out
+
+
+def fitted(design: Array, target: Array) -> Array:
+    """Return least-squares coefficients; columns differ in size by orders of magnitude."""
+    size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(design / size, target, rcond=1e-9)[0] / size)
+
+
+def moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
+    """Return how far causes move positions, then turns where measured, over the noise, (rows,)."""
+    out = []
+    for taken in takes:
+        out.append(deviation(cell, causes, taken).ravel() / cell.tracker.sigma)
+        if cell.tracker.orientation:
+            real, ideal = (record(cell, own, taken, exact(cell.tracker)) for own in (causes, ()))
+            there = Rotation.from_quat(ideal.quaternion)
+            if not ideal.static:
+                t = np.clip(real.t_measured, ideal.t_measured[0], ideal.t_measured[-1])
+                there = Slerp(ideal.t_measured, there)(t)
+            turn = (Rotation.from_quat(real.quaternion) * there.inv()).as_rotvec()
+            out.append(turn.ravel() / cell.tracker.sigma_orientation)
+    return np.concatenate(out)
+
+
+def frame_columns(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
+    """Return the columns of the frames that are fitted, in the rows of `moved`; none that is zero."""
+    seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
+    columns = [
+        np.concatenate([_frame_column(cell, own, frame, shift, turn) for own in seen])
+        for frame in align
+        for shift, turn in zip(np.eye(6, 3), np.eye(6, 3, -3), strict=True)
+    ]
+    return [column for column in columns if column.any()]
+
+
+def _frame_column(
+    cell: BlindCell, seen: PlantRecording, frame: str, shift: Array, turn: Array
+) -> Array:
+    """Return what a frame's shift or turn, (3,) each, does to one recording, over its noise."""
+    if frame == 'tool':
+        rotation = matrix_from_quaternion(np.asarray(seen.quaternion))
+        along, about = rotation @ shift, rotation @ turn
+    else:
+        about = np.tile(turn, (len(seen.position), 1))
+        along = shift + np.cross(about, seen.position)
+    out = (along.ravel() / cell.tracker.sigma, about.ravel() / cell.tracker.sigma_orientation)
+    return np.concatenate(out if cell.tracker.orientation else out[:1])
+
+
+def changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:
+    """Yield all causes with each number of one changed a little."""
+    own = causes[k]
+    for key in (*SIZES[own['effect']], *TURNING.get(own['effect'], ())):
+        if key not in own:
+            continue
+        value = np.asarray(own[key], dtype=float)
+        step = STEP if key in TURNING.get(own['effect'], ()) else STEP * np.abs(value).max()
+        for at in np.ndindex(value.shape):
+            other = value.copy()
+            other[at] += step
+            yield [*causes[:k], {**own, key: other.tolist()}, *causes[k + 1 :]]
+
+
+def true_shares(case: SealedCase) -> list[float]:
+    """
+    Return the true share of every cause of a case.
+
+    As a diagnosis tells it: of the squared gap with its noise, what is no noise is parted by how
+    far each cause moves the tool along with all of them together. One that works against the
+    others takes nothing off the gap beside them, and has a share of zero. The noise is all that
+    is not the causes': the instrument's, and that of stamps that jitter.
+    """
+    whole = deviation(case.cell, case.causes, case.train)
+    noise, _ = floor(case.cell, case.causes, case.train)
+    square = float((whole**2).sum(axis=-1).mean())
+    along = [
+        max(float((deviation(case.cell, [cause], case.train) * whole).sum(axis=-1).mean()), 0.0)
+        for cause in case.causes
+    ]
+    explained = square / (square + noise**2) / max(sum(along), 1e-300)
+    return [explained * part for part in along]
+
+
+HALF = 0.5
+"""Part of what is said of a cause that has to be there."""
+LARGE = 0.1
+"""Share of the squared gap that may be missing where it is more than noise."""
+
+
+def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
+    """
+    Return for every cause told what part of it is there: by its names, places and dependences.
+
+    case: with all its errors. None of what has no name, or a name that the model does not hold.
+    """
+    cell = replace(case.cell, align=(), tracker=replace(case.cell.tracker, orientation=False))
+    frames = np.array(frame_columns(cell, [case.test], case.cell.align)).T
+
+    def shown(off: Array) -> Array:
+        """Return a displacement (M, 3) without what fitted frames take up, in units of noise."""
+        rows = off.ravel() / cell.tracker.sigma
+        return np.asarray(rows - frames @ fitted(frames, rows) if frames.size else rows)
+
+    seen = as_recording('test', record(cell, case.causes, case.test, exact(cell.tracker)))
+    assert seen.measured is not None
+    model, t = found.model, seen.measured.t
+    whole = model.twin(0).poses(seen, t).position
+    real = [shown(deviation(cell, [own], case.test)) for own in case.causes]
+    sites = [site(own) for own in case.causes]
+    words = levels_of({'sites': sites, 'construction': None, 'robot': case.lot.robot})
+
+    def part_of(told: Told) -> dict[str, float] | None:
+        names = [] if told.rest else [(str(own.effect), own.joint) for own, _ in told.name]
+        own = [model.found[k] for k in told.members]
+        gone = [e for e in own if (e.name, e.site) in names]
+        if not gone:
+            return None
+        rest = model.with_found(tuple(e for e in model.found if e not in gone))
+        said = shown(whole - rest.twin(0).poses(seen, t).position)
+
+        def share(meant: Sequence[bool]) -> float:
+            off = [rows for rows, own in zip(real, meant, strict=True) if own]
+            return float(said @ np.sum(off, axis=0) / (said @ said)) if off else 0.0
+
+        places, dependences = _listed(told.place), _listed(told.dependence)
+        return {
+            'name': max(share([own in kind for own in sites]) for kind in _kinds(case, names)),
+            'place': share([bool(own.places & places) for own in words]),
+            'dependence': share([bool(own.dependences & dependences) for own in words]),
+        }
+
+    return [part_of(told) for told in found.causes]
+
+
+def _kinds(case: SealedCase, names: Sequence[Site]) -> list[set[Site]]:
+    """Return the sites named of every kind, and of all, with all that are the same error."""
+    robot = case.lot.robot
+    alike = [(own[0], alike_by_structure(robot, own)) for own in names]
+    kinds = [{kind} for kind, _ in alike]
+    return [
+        set[Site]().union(*(each for kind, each in alike if kind in among))
+        for among in (*kinds, {kind for kind, _ in alike})
+    ]
+
+
+def _listed(told: Sequence[tuple[Any, float]]) -> set[str]:
+    return {str(word) for word, _ in told}
+
+
+def _complete(row: Mapping[str, Any]) -> bool:
+    """Return whether what a model misses on a sealed motion is noise, or a tenth of the gap."""
+    left, floor, gap = (row['sealed'][key] for key in ('after', 'floor', 'before'))
+    return bool(left**2 - floor**2 <= max(floor**2, LARGE * gap**2))
+
+
+def right(row: Mapping[str, Any]) -> bool:
+    """Return whether an answer is right as a whole: all that it names is there, and no more."""
+    named = [own['name'] >= HALF for own in row['there'] if own is not None]
+    return row['verdict']['status'] in NAMING and all(named) and _complete(row)
+
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -88,11 +445,11 @@ def _right(row: Mapping[str, Any], judgement: Judged) -> bool:
     Of two or three causes those that do not show may be missing, as of four to six.
     """
     if 'there' in row:
-        return right_everywhere(row)
-    right = judgement.right
-    if 'shown' in row['truth'] and not (right and judgement.kind in FEW):
-        right = whole(row['truth'], row['verdict']).right
-    return right and sets_hold(row)
+        return right(row)
+    told = judgement.right
+    if 'shown' in row['truth'] and not (told and judgement.kind in FEW):
+        told = whole(row['truth'], row['verdict']).right
+    return told and sets_hold(row)
 
 
 def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str]) -> bool:

@@ -26,9 +26,9 @@ from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
 from ..blind.cause_sizes import CAUSES, FAMILIES, MOVING, SIZES, Cause, plausible, scaled, site
 from ..blind.cause_sizes import draw as drawn_cause
 from ..blind.making import STRATA, SealedCase
-from ..blind.measures import rms
+from ..blind.scoring import rms
+from .judged import STEP, TURNING, alike_by_structure, changed, fitted, frame_columns, moved
 from .trial import COMMON, OFTEN, SEVERAL, drawn
-from .truth import STEP, TURNING, alike_by_structure, changed, fitted, frame_columns, moved
 
 DRAWS = 2
 """Causes drawn of each family at each joint: phases and instants differ; sizes are fitted."""

@@ -17,7 +17,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..blind.measures import (
+from ..blind.scoring import (
+    NOT_IN_LIBRARY,
     Measure,
     Question,
     bootstrap,
@@ -27,7 +28,6 @@ from ..blind.measures import (
     measured,
     share,
 )
-from ..blind.scoring import NOT_IN_LIBRARY
 from ..study import Study, require_simulator, tabled
 from . import learning
 from .judged import Example, examples_of, kept
@@ -249,7 +249,6 @@ def worth(examples: Sequence[Example]) -> dict[str, Any]:
 
 
 def _risk_at(reported: Array, right: NDArray[np.bool_]) -> float:
-    """Return the share that is wrong among the surest."""
     first = np.argsort(-reported, kind='stable')[: max(round(COVERAGE * reported.size), 1)]
     return float((~right[first]).mean())
 

@@ -46,9 +46,9 @@ from ..blind.cause_sizes import (
     uneven_errors,
 )
 from ..blind.making import KINDS, ROBOTS, Deck, Lot, SealedCase, draw_case, lots, truth_of
-from ..blind.measures import counted, gap_on, nominal_on, rms
+from ..blind.scoring import counted, gap_on, nominal_on, rms
 from ..study import engine_digest
-from .truth import FEW, shown, there
+from .judged import FEW, shown, there
 
 USUAL, SEVERAL, EVERYWHERE, FOREIGN = 'usual', 'several', 'everywhere', 'foreign'
 """Mixes of cases."""
@@ -216,7 +216,6 @@ DIGITS = 4
 
 
 def rounded(value: Any) -> Any:
-    """Return plain values with the digits that are kept."""
     if isinstance(value, float):
         return float(f'{value:.{DIGITS}g}')
     if isinstance(value, Mapping):

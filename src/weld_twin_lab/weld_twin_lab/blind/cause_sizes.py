@@ -61,7 +61,7 @@ RIPPLE_ORDERS = (1, 2, 3, 8, 20, 50, 80, 100)
 def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     """Return a cause of its typical size on a joint drawn at random, for a recording of a span [s]."""
     typical = CAUSES[family]
-    drawn = typical.draw(robot, span, rng)
+    drawn = typical.draw(Here(robot, span, rng))
     if not typical.signed:
         return {'effect': family, **drawn}
     size = typical.sizes[0]
@@ -96,15 +96,36 @@ def scaled(cause: Mapping[str, Any], factor: float) -> Cause:
 
 
 def site(cause: Mapping[str, Any]) -> tuple[str, str | None]:
-    """Return family and joint."""
     return cause['effect'], cause.get('joint')
+
+
+class Here(NamedTuple):
+    """What a cause is drawn for, and by what."""
+
+    robot: Robot
+    span: float
+    """Duration of the recording [s]."""
+    rng: np.random.Generator
+
+    def joint(self) -> str:
+        return str(self.rng.choice(self.robot.joint_names))
+
+    def between(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def vector(self, size: float) -> list[float]:
+        way = self.rng.standard_normal(3)
+        return [float(size * part) for part in way / np.linalg.norm(way)]
+
+
+Drawn = Callable[[Here], Any]
 
 
 class Typical(NamedTuple):
     """A cause of its typical size."""
 
-    draw: Callable[..., Cause]
-    """Takes robot, duration [s] and generator; returns the cause without its name."""
+    draw: Drawn
+    """Returns the cause without its name."""
     sizes: tuple[str, ...]
     """The parameters that grow with it."""
     signed: bool = False
@@ -114,132 +135,67 @@ class Typical(NamedTuple):
     outside: bool = False
     """Whether the library of effects has none of its kind."""
 
-
-def _joint(robot: Robot, rng: np.random.Generator) -> str:
-    return str(rng.choice(robot.joint_names))
-
-
-def _vector(size: float, rng: np.random.Generator) -> list[float]:
-    way = rng.standard_normal(3)
-    return [float(size * part) for part in way / np.linalg.norm(way)]
+    def beside(self, **more: Drawn) -> Typical:
+        """Return the same with more that is drawn after it."""
+        return self._replace(
+            draw=lambda here: self.draw(here) | {key: tell(here) for key, tell in more.items()}
+        )
 
 
 def _one(key: str, size: float, **more: bool) -> Typical:
-    """Return a cause with a joint and one number."""
-    return Typical(
-        lambda robot, span, rng: {'joint': _joint(robot, rng), key: size}, (key,), **more
-    )
+    return Typical(lambda here: {'joint': here.joint(), key: size}, (key,), **more)
 
 
 def _whole(key: str, size: float, **more: bool) -> Typical:
-    """Return a cause with one number."""
-    return Typical(lambda robot, span, rng: {key: size}, (key,), **more)
+    return Typical(lambda here: {key: size}, (key,), **more)
 
 
 def _turned(key: str, size: float, **more: bool) -> Typical:
     """Return a cause with one vector that points anywhere."""
-    return Typical(lambda robot, span, rng: {key: _vector(size, rng)}, (key,), **more)
+    return Typical(lambda here: {key: here.vector(size)}, (key,), **more)
 
 
 def _frame(xyz: float, turn: float) -> Typical:
-    return Typical(
-        lambda robot, span, rng: {'xyz': _vector(xyz, rng), 'rotvec': _vector(turn, rng)}, POSE
-    )
+    return Typical(lambda here: {'xyz': here.vector(xyz), 'rotvec': here.vector(turn)}, POSE)
 
 
-def _ripple(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {
-        'joint': _joint(robot, rng),
-        'amplitude': 2e-4,
-        'order': int(rng.choice(RIPPLE_ORDERS)),
-        'phase': float(rng.uniform(-np.pi, np.pi)),
-    }
-
-
-def _coupling(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+def _coupling(here: Here) -> Cause:
     """Return a wrist joint that follows its neighbour, as in a gear train."""
-    at = int(rng.integers(1, robot.n))
-    return {'joint': robot.joint_names[at], 'source': robot.joint_names[at - 1], 'ratio': 5e-4}
+    at, names = int(here.rng.integers(1, here.robot.n)), here.robot.joint_names
+    return {'joint': names[at], 'source': names[at - 1], 'ratio': 5e-4}
 
 
-def _compliance(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    at = int(rng.integers(1, min(4, robot.n)))
-    return {'joint': robot.joint_names[at], 'compliance': 8e-6}
+def _compliance(here: Here) -> Cause:
+    at = int(here.rng.integers(1, min(4, here.robot.n)))
+    return {'joint': here.robot.joint_names[at], 'compliance': 8e-6}
 
 
-def _give(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'compliance': np.abs(_vector(5e-6, rng)).tolist()}
+def _warm_up(here: Here) -> Cause:
+    long = np.flatnonzero(np.hypot(here.robot.a, here.robot.d) > LONG)
+    joint = here.robot.joint_names[int(here.rng.choice(long))]
+    return {'joint': joint, 'strain': 3e-4, 'warming_time': here.span * here.between(0.2, 0.8)}
 
 
-def _payload(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'mass': 1.0, 'com': _vector(float(rng.uniform(0.0, 0.1)), rng)}
+def _knock(here: Here) -> Cause:
+    time = here.span * here.between(0.3, 0.7)
+    return {'time': time, 'xyz': here.vector(3e-4), 'rotvec': here.vector(3e-4)}
 
 
-def _vibration(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {
-        'joint': _joint(robot, rng),
-        'frequency': float(rng.uniform(4.0, 15.0)),
-        'damping': float(rng.uniform(0.02, 0.08)),
-        'gain': 0.5,
-    }
+def _friction(here: Here) -> Cause:
+    uneven = here.between(-0.3, 0.3)
+    return {'joint': here.joint(), 'windup': 3e-4, 'asymmetry': uneven}
 
 
-def _warm_up(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    long = np.flatnonzero(np.hypot(robot.a, robot.d) > LONG)
-    joint = robot.joint_names[int(rng.choice(long))]
-    return {'joint': joint, 'strain': 3e-4, 'warming_time': float(span * rng.uniform(0.2, 0.8))}
+def _hysteresis(here: Here) -> Cause:
+    travel = float(np.exp(here.between(*np.log((0.01, 0.1)))))
+    return {'joint': here.joint(), 'amplitude': 3e-4, 'travel': travel}
 
 
-def _tilt(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'joint': _joint(robot, rng), 'tilt': 3e-4, 'phase': float(rng.uniform(-3.1, 3.1))}
-
-
-def _knock(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    time = float(span * rng.uniform(0.3, 0.7))
-    return {'time': time, 'xyz': _vector(3e-4, rng), 'rotvec': _vector(3e-4, rng)}
-
-
-def _bend(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'rotvec': _vector(4e-4, rng), 'time_constant': float(span * rng.uniform(0.2, 0.6))}
-
-
-def _wander(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'joint': _joint(robot, rng), 'amplitude': 4e-4, 'time_constant': 0.15 * span}
-
-
-def _friction(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    uneven = float(rng.uniform(-0.3, 0.3))
-    return {'joint': _joint(robot, rng), 'windup': 3e-4, 'asymmetry': uneven}
-
-
-def _hysteresis(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    travel = float(np.exp(rng.uniform(*np.log((0.01, 0.1)))))
-    return {'joint': _joint(robot, rng), 'amplitude': 3e-4, 'travel': travel}
-
-
-def _pedestal(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    """Return a pedestal that is softer one way than the other, as brackets are."""
-    return {'compliance': (2e-6 * rng.uniform(0.3, 1.7, 2)).tolist()}
-
-
-def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+def _hose(here: Here) -> Cause:
     """Return a hose from above the arm, out of its reach."""
-    reach = float(np.hypot(robot.a, robot.d).sum())
-    hook = [rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4), rng.uniform(1.0, 1.5)]
-    return {'hook': [reach * float(x) for x in hook], 'tension': 15.0, 'length': reach}
-
-
-def _sag(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    """Return a torch that stands aside of its bracket, as most do."""
-    return {'bend': 2.5e-4, 'lever': [*rng.uniform(-0.1, 0.1, 2), float(rng.uniform(0.15, 0.35))]}
-
-
-def _quadratic(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'coefficient': 3e-4, 'origin': _vector(float(rng.uniform(0.0, 1.0)), rng)}
-
-
-def _wear(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
-    return {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))}
+    reach = float(np.hypot(here.robot.a, here.robot.d).sum())
+    hook = [here.between(-0.4, 0.4), here.between(-0.4, 0.4), here.between(1.0, 1.5)]
+    return {'hook': [reach * x for x in hook], 'tension': 15.0, 'length': reach}
 
 
 def _usual(kind: type[Effect]) -> Typical:
@@ -249,7 +205,7 @@ def _usual(kind: type[Effect]) -> Typical:
         sizes[p.name] = p.typical if p.size < 2 else [p.typical] * p.size
     on_joint = kind.of in ('joint', 'link')
     return Typical(
-        lambda robot, span, rng: {**({'joint': _joint(robot, rng)} if on_joint else {}), **sizes},
+        lambda here: {**({'joint': here.joint()} if on_joint else {}), **sizes},
         (first.name,),
         signed=first.lower < 0.0,
         moving='velocity' in kind.needs,
@@ -265,34 +221,59 @@ CAUSES: dict[str, Typical] = {
     'base_pose': _frame(3e-4, 5e-4),
     'tool_pose': _frame(3e-4, 1e-3),
     'gear_ratio': _one('scale', 5e-4, signed=True),
-    'transmission_ripple': Typical(_ripple, ('amplitude',)),
+    'transmission_ripple': _one('amplitude', 2e-4).beside(
+        order=lambda here: int(here.rng.choice(RIPPLE_ORDERS)),
+        phase=lambda here: here.between(-np.pi, np.pi),
+    ),
     'joint_coupling': Typical(_coupling, ('ratio',), signed=True),
     'backlash': _one('width', 6e-4),
     'joint_compliance': Typical(_compliance, ('compliance',)),
-    'cartesian_compliance': Typical(_give, ('compliance',)),
-    'payload': Typical(_payload, ('mass',)),
+    'cartesian_compliance': Typical(
+        lambda here: {'compliance': np.abs(here.vector(5e-6)).tolist()}, ('compliance',)
+    ),
+    'payload': _whole('mass', 1.0).beside(com=lambda here: here.vector(here.between(0.0, 0.1))),
     'servo_lag': _one('time_constant', 0.008, moving=True),
     'time_delay': _whole('delay', 0.006, signed=True, moving=True),
     'thermal_growth': _whole('coefficient', 3e-5),
     'drift': _turned('xyz_rate', 1e-5),
-    'vibration': Typical(_vibration, ('gain',), moving=True),
+    'vibration': _one('gain', 0.5, moving=True).beside(
+        frequency=lambda here: here.between(4.0, 15.0),
+        damping=lambda here: here.between(0.02, 0.08),
+    ),
     'quantization': _one('step', 6e-4),
     'measurement_scale': _whole('scale', 1e-4, signed=True),
     'station_step': Typical(_knock, POSE, outside=True),
     'tool_slip': Typical(_knock, POSE, outside=True),
-    'quadratic_scale': Typical(_quadratic, ('coefficient',), signed=True, outside=True),
-    'column_bend': Typical(_bend, ('rotvec',), outside=True),
+    'quadratic_scale': _whole('coefficient', 3e-4, signed=True, outside=True).beside(
+        origin=lambda here: here.vector(here.between(0.0, 1.0))
+    ),
+    'column_bend': _turned('rotvec', 4e-4, outside=True).beside(
+        time_constant=lambda here: here.span * here.between(0.2, 0.6)
+    ),
     'stick_slip': _one('amplitude', 6e-4, moving=True, outside=True),
-    'friction_wander': Typical(_wander, ('amplitude',), moving=True, outside=True),
+    'friction_wander': _one('amplitude', 4e-4, moving=True, outside=True).beside(
+        time_constant=lambda here: 0.15 * here.span
+    ),
     'dress_pack': _one('amplitude', 5e-4, signed=True, outside=True),
     'friction': Typical(_friction, ('windup',), moving=True),
     'hysteresis': Typical(_hysteresis, ('amplitude',), moving=True),
-    'bearing_tilt': Typical(_tilt, ('tilt',), signed=True),
+    'bearing_tilt': _one('tilt', 3e-4, signed=True).beside(
+        phase=lambda here: here.between(-3.1, 3.1)
+    ),
     'loaded_play': _one('width', 6e-4),
-    'wear': Typical(_wear, ('rate',), signed=True),
-    'pedestal_tilt': Typical(_pedestal, ('compliance',)),
+    'wear': _whole('rate', 1e-5, signed=True).beside(
+        slower=lambda here: here.span * here.between(1.5, 4.0)
+    ),
+    # Brackets are softer one way than the other.
+    'pedestal_tilt': Typical(
+        lambda here: {'compliance': (2e-6 * here.rng.uniform(0.3, 1.7, 2)).tolist()},
+        ('compliance',),
+    ),
     'hose_pull': Typical(_hose, ('tension',)),
-    'tool_sag': Typical(_sag, ('bend',)),
+    # Most torches stand aside of their bracket.
+    'tool_sag': _whole('bend', 2.5e-4).beside(
+        lever=lambda here: [*here.rng.uniform(-0.1, 0.1, 2), here.between(0.15, 0.35)]
+    ),
     'refraction': _turned('warming', 2.0),
     'gear_ratio_by_direction': _one('difference', 1e-3, signed=True),
     'clock_rate': _whole('rate', 2e-5, signed=True, moving=True),

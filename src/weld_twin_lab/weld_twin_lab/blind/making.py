@@ -31,7 +31,7 @@ from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
-from ..plant.outside_causes import FLANK_TORQUE
+from ..plant.lost_motion import FLANK_TORQUE
 from . import seal
 from .blind_cell import (
     SPANS,
@@ -59,7 +59,7 @@ from .cause_sizes import (
     scaled,
     site,
 )
-from .measures import correlation, rms
+from .scoring import correlation, rms
 
 Card = TypeVar('Card')
 
@@ -172,7 +172,6 @@ class Deck(Generic[Card]):
         self._left: list[Card] = []
 
     def next(self) -> Card:
-        """Return the next card."""
         if not self._left:
             self._left = [self._cards[k] for k in self._rng.permutation(len(self._cards))]
         return self._left.pop()
@@ -350,7 +349,6 @@ def make(
 
 
 def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
-    """Refuse to mix these cases with others."""
     if cases.resolve() == truths.resolve():
         raise DataError('cases and truths must go to different directories')
     if (truths / seal.TRUTHS).exists():
@@ -392,7 +390,7 @@ def draw_case(
     Return a case that shows its causes as large as the lot wants them.
 
     spans: shortest and longest recording [s].
-    poor: how the motion diagnosed is made poor, as `poor_motion.poorer` takes it.
+    poor: how the motion diagnosed is made poor, as `blind_cell.poorer` takes it.
 
     Raises DataError: no cell and motion drawn shows them.
     """

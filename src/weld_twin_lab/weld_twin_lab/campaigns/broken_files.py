@@ -79,7 +79,6 @@ class Target:
 
 @cache
 def targets() -> dict[str, Target]:
-    """Return all kinds of files by name."""
     robots = [catalog.load(name) for name in ('ur5', 'franka_panda')]
     bags = {storage: _bag(storage) for storage in ('mcap', 'sqlite3')}
     return {
@@ -90,12 +89,7 @@ def targets() -> dict[str, Target]:
         'effects': Target(
             '.yaml', 'yaml', _encoded([EFFECTS]), lambda path: read_effects(path, ROBOT)
         ),
-        'tolerances': Target(
-            '.yaml',
-            'yaml',
-            _encoded([TOLERANCES]),
-            lambda path: tolerances_from_list(read_yaml(path, 'tolerance file'), ROBOT),
-        ),
+        'tolerances': Target('.yaml', 'yaml', _encoded([TOLERANCES]), _tolerances),
         'table': Target('.csv', 'text', _tables(), lambda path: read_table(path, ROBOT)),
         'diagnosis': Target('.json', 'json', _encoded([_diagnosis()]), _model),
         'path': Target('.yaml', 'yaml', _encoded(PATHS), read_path),
@@ -118,6 +112,10 @@ def _urdf() -> str:
     with tempfile.TemporaryDirectory() as place:
         write_urdf(Path(place) / 'robot.urdf', ROBOT)
         return (Path(place) / 'robot.urdf').read_text(encoding='utf-8')
+
+
+def _tolerances(path: Path) -> Any:
+    return tolerances_from_list(read_yaml(path, 'tolerance file'), ROBOT)
 
 
 def _model(path: Path) -> Any:
@@ -149,23 +147,12 @@ def _tables() -> tuple[bytes, ...]:
 def _diagnosis() -> str:
     frame = np.eye(4).tolist()
     effects = effects_from_list(parse_yaml(EFFECTS, 'effects'), ROBOT)
-    return json.dumps(
-        {
-            'schema': 'weld_twin/diagnosis/1',
-            'model': {
-                'tool': frame,
-                'bases': [frame],
-                'known': [],
-                'epochs_ns': [0],
-                'spans_ns': [[0, 1]],
-                'found': [effect.to_mapping() for effect in effects],
-            },
-        }
-    )
+    model = {'tool': frame, 'bases': [frame], 'known': [], 'epochs_ns': [0], 'spans_ns': [[0, 1]]}
+    model['found'] = [effect.to_mapping() for effect in effects]
+    return json.dumps({'schema': 'weld_twin/diagnosis/1', 'model': model})
 
 
 def _bag(storage: str) -> tuple[bytes, bytes]:
-    """Return a storage file and its metadata."""
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / 'bag'
         write_recording(path, _recording(), ROBOT, storage=storage)
@@ -200,55 +187,26 @@ def _read_listed(path: Path, storage: bytes) -> Any:
 
 
 NUMBERS = (
-    b'nan',
-    b'.nan',
-    b'inf',
-    b'-.inf',
-    b'1e308',
-    b'-1e308',
-    b'1e-320',
-    b'0',
-    b'-0.0',
-    b'-1',
-    b'',
-    b'1e999',
-    b'9223372036854775808',
-    b'1' * 400,
-    b'0x10',
-    b'1_000',
-    b'12:30:45',
-    b'1,5',
-    b'~',
+    *(
+        b'nan',
+        b'.nan',
+        b'inf',
+        b'-.inf',
+        b'1e308',
+        b'-1e308',
+        b'1e-320',
+        b'0',
+        b'-0.0',
+        b'-1',
+        b'',
+    ),
+    *(b'1e999', b'9223372036854775808', b'1' * 400, b'0x10', b'1_000', b'12:30:45', b'1,5', b'~'),
 )
 """What may stand in the place of a number: none, endless, huge, and no number at all."""
 VALUES: tuple[Any, ...] = (
-    None,
-    True,
-    False,
-    0,
-    -1,
-    1.5,
-    1e308,
-    -1e308,
-    1e-320,
-    float('nan'),
-    float('inf'),
-    10**30,
-    '',
-    'x',
-    'nan',
-    'x' * 3000,
-    '\x00',
-    '\U0001f600',
-    [],
-    {},
-    [[]],
-    [1, 2],
-    [None] * 3,
-    {'x': 1},
-    {'': {}},
-    [[1.0] * 4] * 4,
-    ['a', 1, None],
+    *(None, True, False, 0, -1, 1.5, 1e308, -1e308, 1e-320, float('nan'), float('inf'), 10**30),
+    *('', 'x', 'nan', 'x' * 3000, '\x00', '\U0001f600'),
+    *([], {}, [[]], [1, 2], [None] * 3, {'x': 1}, {'': {}}, [[1.0] * 4] * 4, ['a', 1, None]),
 )
 SIZES = (0, 1, 0x7F, 0xFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 2**40, 2**62, 2**63 - 1, 2**64 - 1)
 """What may stand in the place of a length: ends of the ranges of integers."""
@@ -291,12 +249,8 @@ def _tree(rng: Random, seed: bytes, kind: str) -> bytes:
 def _places(data: Any) -> list[tuple[Any, Any]]:
     if not isinstance(data, dict | list):
         return []
-    items = data.items() if isinstance(data, dict) else enumerate(data)
-    out = []
-    for key, value in items:
-        out.append((data, key))
-        out += _places(value)
-    return out
+    items = list(data.items() if isinstance(data, dict) else enumerate(data))
+    return [place for key, value in items for place in ((data, key), *_places(value))]
 
 
 def _span(rng: Random, data: bytes) -> tuple[int, int]:

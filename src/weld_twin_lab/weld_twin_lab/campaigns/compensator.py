@@ -27,9 +27,8 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
-from weld_twin_core.twin.goal_motion import Goal, course, fine_times
+from weld_twin_core.twin.goal_motion import Goal, approached, course, fine_times
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_core.twin.reversals import approached
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import read_json
@@ -80,6 +79,8 @@ EACH = 3
 """Goals after each change."""
 AFTER = 100_000
 """Number of the first goal after a change: those before are counted from 0."""
+LIMITS = GoalLimits(acceleration=20.0)
+"""As a compensator has them that is told nothing else."""
 
 
 class CellTrial:
@@ -178,11 +179,9 @@ class CellTrial:
         self.measured.messages.clear()
         self.deviations.messages.clear()
         way = course(goal, np.minimum(np.array(meant), goal.t[-1]))
-        apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
         # The arm is looked at more often where it turns; each look stands for its part of the time.
-        share = np.gradient(np.array(meant)) if len(meant) > 1 else np.ones(1)
-        squares = (apart**2).sum(axis=1)
-        return float(np.sqrt(np.average(squares, weights=share))), float(np.sqrt(squares.max()))
+        share = np.gradient(np.array(meant)) if len(meant) > 1 else None
+        return _sizes(np.array(real) - forward(self.robot, way.q)[:, :3, 3], share)
 
     def measured_until(self, stamp: int) -> None:
         """Wait until the tool was measured at a stamp [ns]."""
@@ -204,7 +203,8 @@ class CellTrial:
             taken, line = self.run(goal, through=through)
             if taken:
                 offs.append(self.off(goal, line.get('waits_s', 0.0)))
-        best = self._best(goal, Start(goal.q[0], False, came))
+        true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
+        best = corrected_goal(true, goal, LIMITS, Start(goal.q[0], False, came))
         return {
             'robot': self.name,
             'arm': self.arm.seed,
@@ -216,17 +216,11 @@ class CellTrial:
             'before_m': offs[0][0],
             'after_m': offs[-1][0],
             'worst_m': offs[-1][1],
-            'best_m': min(best, offs[0][0]),
+            'best_m': min(np.inf if isinstance(best, Refusal) else best.after, offs[0][0]),
             'expected_m': line.get('expected_after_m'),
             'bound_m': line.get('bound_m'),
             'largest_m': line.get('largest_m'),
         }
-
-    def _best(self, goal: Goal, start: Start) -> float:
-        """Return what would be left with the true causes [m]."""
-        true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
-        correction = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
-        return np.inf if isinstance(correction, Refusal) else correction.after
 
     # Changes ---------------------------------------------------------------------------------
 
@@ -285,11 +279,8 @@ class CellTrial:
 
 def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
     """Return what a torch of another weight does: it bends the shoulder and the elbow."""
-    joints = robot.joint_names
-    return (
-        {'effect': 'joint_offset', 'joint': joints[1], 'offset': 4e-4},
-        {'effect': 'joint_offset', 'joint': joints[2], 'offset': -5e-4},
-    )
+    bent = zip(robot.joint_names[1:3], (4e-4, -5e-4), strict=True)
+    return tuple({'effect': 'joint_offset', 'joint': at, 'offset': by} for at, by in bent)
 
 
 def tried(
@@ -344,10 +335,6 @@ def other_arm(seed: int) -> str:
         return f'exit code {code}: {process.log.strip().splitlines()[-1]}'
 
 
-LIMITS = GoalLimits(acceleration=20.0)
-"""As a compensator has them that is told nothing else."""
-
-
 def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
     """Return what becomes of the goals of one arm that stands where each of them begins."""
     robot, causes, rng = cell_of(name, seed)
@@ -383,9 +370,13 @@ def _off(true: ProgramModel, run: Goal, goal: Goal, start: Start) -> tuple[float
     way = Recording('goal', JointMotion(at, course(run, at).q))
     came = approached(way, start.came, start.q)
     real = Twin(true.robot, true.effects).poses(came).position[-at.size :]
-    apart = real - forward(true.robot, course(goal, at).q)[:, :3, 3]
+    return _sizes(real - forward(true.robot, course(goal, at).q)[:, :3, 3])
+
+
+def _sizes(apart: Array, share: Array | None = None) -> tuple[float, float]:
+    """Return RMS, each by its share, and most of the lengths of vectors (N, 3) [m]."""
     squares = (apart**2).sum(axis=1)
-    return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
+    return float(np.sqrt(np.average(squares, weights=share))), float(np.sqrt(squares.max()))
 
 
 WORSE = (2e-5, 0.05)
@@ -411,8 +402,6 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change."""
     begun = time.monotonic()
     with messages_importable():
-        from .compensator import other_arm, tried
-
         known = _before(args)
 
         def keep(said: str) -> None:
@@ -435,7 +424,6 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
 
 
 def _made(args: Given, known: Known, other: str) -> dict[str, Any]:
-    """Return what goes into the file."""
     results = summary(known.rows, known.changes, other, known.without)
     return {**results, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
 
@@ -574,10 +562,8 @@ def table(result: dict[str, Any]) -> str:
     lines = [tabled(COLUMNS, arms), _changes(result)]
     more = result['without_cell']
     if more and more['robots']:
-        arms = [*more['robots'].items(), ('all', more['totals'])]
-        lines.append(tabled(COLUMNS, arms))
-    lines.append(_spread(result))
-    return '\n\n'.join(lines)
+        lines.append(tabled(COLUMNS, [*more['robots'].items(), ('all', more['totals'])]))
+    return '\n\n'.join([*lines, _spread(result)])
 
 
 def _spread(result: dict[str, Any]) -> str:

@@ -68,7 +68,6 @@ class Arm(NamedTuple):
     """Whether its cell is changed after the goals."""
 
     def of(self, rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Return the rows of this arm."""
         return [row for row in rows if (row['robot'], row['arm']) == (self.name, self.seed)]
 
 

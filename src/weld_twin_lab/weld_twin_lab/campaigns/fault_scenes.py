@@ -236,45 +236,43 @@ class Stand:
     def reported(self, node: str, words: str, within: float) -> tuple[float | None, str]:
         """Return after how long [s] a node's health tells something, and the whole sentence."""
         self.health.clear()
-        begun, sentence = time.monotonic(), ['']
+        begun = time.monotonic()
 
-        def there() -> bool:
-            self.step()
-            for name, entries in self.health.told.items():
-                if name == node or name.startswith(f'{node}: '):
-                    sentence[0] = next(
-                        (text for level, text in entries if words in text and level != 'ok'), ''
-                    )
-                    if sentence[0]:
-                        return True
-            return time.monotonic() - begun > within
+        def told() -> str:
+            entries = (
+                entry
+                for name, every in self.health.told.items()
+                for entry in every
+                if name == node or name.startswith(f'{node}: ')
+            )
+            return next((text for level, text in entries if words in text and level != 'ok'), '')
 
-        self.cell.wait(there, f'{words!r} to be told', limit=within + MEETING)
-        return (time.monotonic() - begun if sentence[0] else None), sentence[0]
+        self._until(lambda: bool(told()), within, f'{words!r} to be told')
+        sentence = told()
+        return (time.monotonic() - begun if sentence else None), sentence
 
     def well(self, node: str, within: float = 30.0) -> bool:
         """Return whether a node says within a time [s] that it is well, and nothing else."""
-        begun, seen = time.monotonic(), [False]
-
-        def there() -> bool:
-            self.step()
-            seen[0] = seen[0] or any(
-                entry == ('ok', 'running') for entry in self.health.told.get(node, ())
-            )
-            return seen[0] or time.monotonic() - begun > within
-
         self.health.clear()
-        self.cell.wait(there, f'{node} to be well', limit=within + MEETING)
-        return seen[0]
+
+        def running() -> bool:
+            return ('ok', 'running') in self.health.told.get(node, ())
+
+        self._until(running, within, f'{node} to be well')
+        return running()
 
     def run(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
+        self._until(lambda: False, seconds, 'some time to pass')
+
+    def _until(self, there: Callable[[], bool], within: float, what: str) -> None:
+        """Go on sending until something is there, or a time [s] is over."""
+        end = time.monotonic() + within
 
         def over() -> bool:
             self.step()
-            return time.monotonic() > end
+            return there() or time.monotonic() > end
 
-        self.cell.wait(over, 'some time to pass', limit=seconds + MEETING)
+        self.cell.wait(over, what, limit=within + MEETING)
 
 
 TWIN, ANALYZER = '/forward_kinematics_twin', '/deviation_analyzer'
@@ -293,8 +291,8 @@ STARTED = 40.0
 LEARNING = 12.0
 """Seconds of sound motion before a fault: the clocks are compared over 8 of them."""
 
-Reported = tuple[str, str, float, 'float | None', str]
-"""What is done, who is to tell, within what time, after what time it did, and what it said [s]."""
+Reported = dict[str, Any]
+"""What is done, who is to tell, within what time [s], after what time it did, and what it said."""
 
 
 class Scene(NamedTuple):
@@ -320,7 +318,7 @@ TRACKER = _turned(2.0, 0.7)
 
 def _reported(stand: Stand, what: str, node: str, words: str, within: float = SOON) -> Reported:
     seconds, said = stand.reported(node, words, within)
-    return what, node, within, seconds, said
+    return {'what': what, 'node': node, 'within_s': within, 'seconds': seconds, 'said': said}
 
 
 def _wrong_frame(stand: Stand) -> Iterator[Reported]:
@@ -378,9 +376,9 @@ def _clock(stand: Stand) -> Iterator[Reported]:
     for offset in OFFSETS:
         stand.run(LEARNING)
         stand.offset = lambda _, o=offset: o  # type: ignore[misc]
-        what, node, _, seconds, said = _reported(stand, f'{offset:+g} s', ANALYZER, ' the joints')
-        right = seconds is not None and seconds <= PROMPT and _names(said, offset)
-        yield what, node, PROMPT, seconds, said if right else ''
+        row = _reported(stand, f'{offset:+g} s', ANALYZER, ' the joints')
+        right = (row['seconds'] or np.inf) <= PROMPT and _names(row['said'], offset)
+        yield row | {'within_s': PROMPT, 'said': row['said'] if right else ''}
         stand.offset = lambda _: 0.0
         stand.well(ANALYZER, STARTED)
 
@@ -396,12 +394,10 @@ def _names(said: str, offset: float) -> bool:
 
 def _drift(stand: Stand) -> Iterator[Reported]:
     stand.offset = lambda t: 0.02 + DRIFT * t
-    what, node, within, seconds, said = _reported(
-        stand, '100 ppm', ANALYZER, 'drifts by', DRIFTING
-    )
-    rate = re.search(r'drifts by ([+-]\d+) ppm', said)
+    row = _reported(stand, '100 ppm', ANALYZER, 'drifts by', DRIFTING)
+    rate = re.search(r'drifts by ([+-]\d+) ppm', row['said'])
     right = rate is not None and abs(float(rate[1]) - DRIFT * 1e6) <= 0.3 * DRIFT * 1e6
-    yield what, node, within, seconds, said if right else ''
+    yield row | {'said': row['said'] if right else ''}
     stand.offset = lambda _: 0.0
 
 
@@ -496,10 +492,7 @@ def _played(scene: Scene, stand: Stand) -> dict[str, Any]:
     first = next(iter(scene.nodes))
     waits = scene.nodes[first].get('robot') == 'topic' or 'base_from_tf' in scene.nodes[first]
     before = waits or all(stand.well(f'/{name}', STARTED) for name in scene.nodes)
-    rows = [
-        {'what': what, 'node': node, 'within_s': within, 'seconds': seconds, 'said': said}
-        for what, node, within, seconds, said in scene.run(stand)
-    ]
+    rows = list(scene.run(stand))
     expected = [row for row in rows if row['within_s']]
     false = [row for row in rows if not row['within_s'] and row['said']]
     after = {node: stand.well(node) for node in scene.mended}

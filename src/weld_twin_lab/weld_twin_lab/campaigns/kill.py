@@ -36,6 +36,7 @@ NOTHING = 'holds no whole message'
 """Of a recording killed before anything reached the disk; what is missing of it is counted."""
 JOINTS = tuple(f'joint_{k}' for k in range(1, 7))
 """Names in every joint state."""
+TOPICS = (JOINT_STATES.name, MEASURED_POSE.name)
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,7 @@ class Trial:
 class _Sent:
     """When each message of the topics was sent [s], by number."""
 
-    times: dict[str, list[float]] = field(
-        default_factory=lambda: {JOINT_STATES.name: [], MEASURED_POSE.name: []}
-    )
+    times: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in TOPICS})
 
     def before(self, moment: float) -> int:
         return sum(int(np.searchsorted(times, moment)) for times in self.times.values())
@@ -179,7 +178,7 @@ def _left(out: Path) -> tuple[str, dict[str, list[int]]]:
     if not out.exists():
         recover(out)
         how = 'recover'
-    numbers: dict[str, list[int]] = {JOINT_STATES.name: [], MEASURED_POSE.name: []}
+    numbers: dict[str, list[int]] = {name: [] for name in TOPICS}
     with BagReader(out) as bag:
         for topic, _, _, message in bag.messages(list(numbers)):
             numbers[topic].append(from_messages.stamp_ns(message) - FIRST)
@@ -215,10 +214,7 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         return {
             'kills': len(chosen),
             'faults': sum(bool(row['fault']) for row in chosen),
-            'missing_s': {
-                'median': round(float(np.median(missing)), 3),
-                'max': round(max(missing), 3),
-            },
+            'missing_s': {'median': _rounded(float(np.median(missing))), 'max': max(missing)},
             'sent': sum(row['sent'] for row in chosen),
             'recovered': sum(row['recovered'] for row in chosen),
         }

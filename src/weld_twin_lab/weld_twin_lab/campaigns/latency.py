@@ -193,8 +193,6 @@ CAUSES = (
     {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 4e-6},
 )
 """What the model holds: constants, a gear's error and a spring."""
-SECONDS = BEAT
-"""Length of a turn [s]: there and back, so that the next one begins where this one ended."""
 
 
 def pose_race(turns: int, rate: float, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -203,7 +201,7 @@ def pose_race(turns: int, rate: float, tell: Callable[[str], None]) -> dict[str,
         model = Path(place) / 'effects.yaml'
         model.write_text(yaml_text(list(CAUSES)))
         kind = POSE_OUT.message_class()
-        relay = Contender('relay', RELAY, kind, ('-p', 'poses:=true'))
+        relay = Contender('relay', RELAY, kind, _words('poses:=true'))
         own = Contender(
             'compensator',
             ('weld_twin_nodes.live.compensator',),
@@ -213,13 +211,14 @@ def pose_race(turns: int, rate: float, tell: Callable[[str], None]) -> dict[str,
         )
         with Race((relay, own), poses=True) as both:
             both.meanwhile = _arm(both)
+            # A turn goes there and back, so that the next one begins where this one ended.
             for contender in (own, relay, own):
-                both.turn(contender, rate, SECONDS)
+                both.turn(contender, rate, BEAT)
             for contender in (own, relay):
                 contender.clear()
             for k in range(turns):
                 for contender in (own, relay) if k % 2 else (relay, own):
-                    both.turn(contender, rate, SECONDS)
+                    both.turn(contender, rate, BEAT)
     out = {each.name: each.result() for each in (relay, own)}
     for name, row in out.items():
         tell(f'{rate:.0f} poses/s  {name:12} {row}')
@@ -254,11 +253,7 @@ WANTED = {'twin': 1.10, 'compensator': 1.5}
 POSES = 500.0
 """Poses a second for the compensator."""
 TWIN = ('weld_twin_nodes.live.forward_kinematics_twin',)
-ON_TF = tuple(
-    word
-    for setting in ('measuring_frame:=world', 'base_frame:=base_link', 'base_from_tf:=true')
-    for word in ('-p', setting)
-)
+ON_TF = _words('measuring_frame:=world', 'base_frame:=base_link', 'base_from_tf:=true')
 """Parameters of a twin that takes its base from `/tf`."""
 COMPARED = ('p50_us', 'p99_us', 'cpu_us')
 RATIOS = (
@@ -280,8 +275,8 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     joints, pose = JOINT_STATES.message_class(), TWIN_POSE.message_class()
     contenders = (
         Contender('relay', RELAY, joints, ()),
-        Contender('raw_relay', RELAY, joints, ('-p', 'raw:=true')),
-        Contender('bare', RELAY, pose, ('-p', 'bare:=true')),
+        Contender('raw_relay', RELAY, joints, _words('raw:=true')),
+        Contender('bare', RELAY, pose, _words('bare:=true')),
         Contender('twin', TWIN, pose, ()),
         Contender('twin_tf', TWIN, pose, ON_TF),
     )
@@ -331,7 +326,6 @@ def _beside_diagnosis(
 ) -> dict[str, Any]:
     """Return the twin's figures at 500 Hz with and without a diagnosis in its own process."""
     job, worker = _job(), Worker()
-    samples: dict[str, dict[str, float]] = {}
     both = {'alone': copy(twin), 'beside': copy(twin)}
     for contender in both.values():
         contender.clear()
@@ -343,9 +337,9 @@ def _beside_diagnosis(
             race.turn(twin, 500.0, args.seconds)
             contender.add(twin)
             worker.stop()
-    for name, contender in both.items():
-        samples[name] = contender.result()
-        tell(f'   500 Hz  twin {name:7} {samples[name]}')
+    samples = {name: contender.result() for name, contender in both.items()}
+    for name, figures in samples.items():
+        tell(f'   500 Hz  twin {name:7} {figures}')
     return samples
 
 

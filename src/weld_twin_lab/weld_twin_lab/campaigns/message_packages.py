@@ -25,28 +25,41 @@ from unittest.mock import patch
 
 from weld_twin_core.errors import TwinError
 
-_TOLERATED = ('position', 'velocity', 'acceleration')
+POINT, POINTS = (
+    'trajectory_msgs/JointTrajectoryPoint',
+    'trajectory_msgs/MultiDOFJointTrajectoryPoint',
+)
+CODES = (
+    *('SUCCESSFUL', 'INVALID_GOAL', 'INVALID_JOINTS', 'OLD_HEADER_TIMESTAMP'),
+    *('PATH_TOLERANCE_VIOLATED', 'GOAL_TOLERANCE_VIOLATED'),
+)
+"""What a trajectory's end is called: 0, -1 and so on."""
+
+
+def _fields(kind: str, *names: str) -> str:
+    return ''.join(f'{kind} {name}\n' for name in names)
+
+
+def _state(*parts: str) -> str:
+    """Return the fields of a controller that tells some states of its joints."""
+    joints = 'std_msgs/Header header\nstring[] joint_names\n' + _fields(POINT, *parts)
+    many = (f'multi_dof_{part}' for part in parts)
+    return joints + 'string[] multi_dof_joint_names\n' + _fields(POINTS, *many)
+
+
+_TOLERATED = _fields('float64', 'position', 'velocity', 'acceleration')
 DEFINITIONS: Mapping[str, Mapping[str, str]] = {
     'tf2_msgs': {'TFMessage': 'geometry_msgs/TransformStamped[] transforms\n'},
     'control_msgs': {
         'InterfaceValue': 'string[] interface_names\nfloat64[] values\n',
         'DynamicJointState': 'std_msgs/Header header\nstring[] joint_names\n'
         'InterfaceValue[] interface_values\n',
-        'JointTrajectoryControllerState': 'std_msgs/Header header\nstring[] joint_names\n'
-        + ''.join(
-            f'trajectory_msgs/JointTrajectoryPoint {part}\n'
-            for part in ('reference', 'feedback', 'error', 'output')
-        )
-        + 'string[] multi_dof_joint_names\n'
-        + ''.join(
-            f'trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{part}\n'
-            for part in ('reference', 'feedback', 'error', 'output')
-        )
+        'JointTrajectoryControllerState': _state('reference', 'feedback', 'error', 'output')
         + 'float64 speed_scaling_factor\n',
-        'JointTolerance': 'string name\n' + ''.join(f'float64 {part}\n' for part in _TOLERATED),
+        'JointTolerance': 'string name\n' + _TOLERATED,
         'JointComponentTolerance': 'uint16 X_AXIS=1\nuint16 Y_AXIS=2\nuint16 Z_AXIS=3\n'
         'uint16 TRANSLATION=4\nuint16 ROTATION=5\nstring joint_name\nuint16 component\n'
-        + ''.join(f'float64 {part}\n' for part in _TOLERATED),
+        + _TOLERATED,
     },
     'mocap4r2_msgs': {
         'Marker': 'int64 index\ngeometry_msgs/Point translation\n',
@@ -66,27 +79,9 @@ ACTIONS: Mapping[str, Mapping[str, str]] = {
             for of in ('path', 'goal')
         )
         + 'builtin_interfaces/Duration goal_time_tolerance\n---\nint32 error_code\n'
-        + ''.join(
-            f'int32 {name} = {code}\n'
-            for name, code in (
-                ('SUCCESSFUL', 0),
-                ('INVALID_GOAL', -1),
-                ('INVALID_JOINTS', -2),
-                ('OLD_HEADER_TIMESTAMP', -3),
-                ('PATH_TOLERANCE_VIOLATED', -4),
-                ('GOAL_TOLERANCE_VIOLATED', -5),
-            )
-        )
-        + 'string error_string\n---\nstd_msgs/Header header\nstring[] joint_names\n'
-        + ''.join(
-            f'trajectory_msgs/JointTrajectoryPoint {part}\n'
-            for part in ('desired', 'actual', 'error')
-        )
-        + 'string[] multi_dof_joint_names\n'
-        + ''.join(
-            f'trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{part}\n'
-            for part in ('desired', 'actual', 'error')
-        )
+        + _fields('int32', *(f'{name} = {-k}' for k, name in enumerate(CODES)))
+        + 'string error_string\n---\n'
+        + _state('desired', 'actual', 'error')
     }
 }
 """The same of their actions."""

@@ -115,7 +115,6 @@ def _packages(source: Path) -> set[str]:
 
 
 def _build(source: Path, work: Path) -> None:
-    """Build what the folder has of the packages that are wanted."""
     work.mkdir(parents=True, exist_ok=True)
     there = [name for name in WANTED if name in _packages(source)]
     prefix = os.pathsep.join(filter(None, [os.environ.get('AMENT_PREFIX_PATH'), sys.prefix]))
@@ -139,7 +138,6 @@ def _build(source: Path, work: Path) -> None:
 
 
 def _environment(install: Path) -> Mapping[str, str]:
-    """Return the environment in which nodes run on what was built."""
     script = f'source {shlex.quote(str(install / "setup.bash"))} && env -0'
     out = subprocess.run(['bash', '-c', script], capture_output=True, text=True, check=True).stdout
     made = dict(item.split('=', 1) for item in out.split('\0') if '=' in item)

@@ -105,13 +105,8 @@ def played(folder: Path, locked: list[dict[str, str]]) -> dict[str, Any]:
     finally:
         codes = _stopped(cell)
     recorded, topics = _recorded(bag)
-    return {
-        'alive': all(alive),
-        'heard': heard,
-        'recorded': recorded,
-        'topics': topics,
-        'codes': codes,
-    }
+    heard_of = {'heard': heard, 'recorded': recorded, 'topics': topics}
+    return {'alive': all(alive), **heard_of, 'codes': codes}
 
 
 def _heard(locked: list[dict[str, str]], folder: Path) -> list[int]:
@@ -138,9 +133,7 @@ def _node(
         sys.executable,
         '-m',
         MODULES[name],
-        '--ros-args',
-        '--enclave',
-        enclave(name),
+        *('--ros-args', '--enclave', enclave(name)),
         *words,
     ]
     with (folder / f'{name}.log').open('wb') as log:

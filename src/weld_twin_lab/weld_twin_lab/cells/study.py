@@ -30,7 +30,7 @@ from weld_twin_msgs_py.tables import read_camera, read_pixels, read_target
 from weld_twin_nodes.offline.task_pool import Task
 
 from ..blind.cause_sizes import AT_REST, Cause, draw, plausible, scaled, site
-from ..blind.measures import rms
+from ..blind.scoring import rms
 from ..plant.exponentials import Command, Motion, compose, exp_screw, from_quaternion, inverse
 from ..plant.plant import run as run_plant
 from ..plant.tracker import Eye, Tracker, looking, seen

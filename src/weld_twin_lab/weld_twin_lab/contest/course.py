@@ -37,7 +37,7 @@ from weld_twin_msgs_py.robots import load_robot
 
 from ..benchmark.race import cost_of
 from ..blind import seal
-from ..blind.measures import measured_of
+from ..blind.scoring import measured_of
 from ..real_arms.sources import Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit
 from .entrants import ENTRANTS, entrant

@@ -18,8 +18,7 @@ from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import seal
 from ..blind.cause_sizes import Site
-from ..blind.measures import NORMAL_90, counted, rms
-from ..blind.scoring import CONFIDENT, IN_LIBRARY, answers_of
+from ..blind.scoring import CONFIDENT, IN_LIBRARY, NORMAL_90, answers_of, counted, rms
 from ..study import Study, listed, tabled
 from . import course
 from .course import ContestAnswer, Name, Run, read_case
@@ -141,7 +140,6 @@ def _names(answer: ContestAnswer) -> list[Name]:
 
 
 def _belief(answer: ContestAnswer, sites: Sequence[Site]) -> float:
-    """Return the mean belief in the families of some causes."""
     each = [
         max((p for effect, _, p in _names(answer) if effect == at[0]), default=0.0) for at in sites
     ]

@@ -21,9 +21,8 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.motion.inverse.newton import STRETCHED, least_step, reaching
 from weld_twin_core.recording import JointMotion, Recording
 
-from ..blind.blind_cell import at_stations
+from ..blind.blind_cell import RATE, at_stations
 from ..blind.cause_sizes import AT_REST, Cause, draw, scaled
-from ..blind.recorded_motion import RATE
 from ..fleet.years import CHECKS, base, cheap_year
 from ..plant.tracker import Tracker
 from ..programs.corrections import promised_and_true, seam_driven

@@ -35,12 +35,12 @@ from weld_twin_core.twin.posterior import (
 from weld_twin_core.twin.program_correction import SURE, accuracy
 from weld_twin_core.twin.twin import Twin
 
+from ..belief.judged import true_shares
 from ..belief.trial import diagnosed, drawn, recordings_of
-from ..belief.truth import true_shares
 from ..blind.blind_cell import GROSS, as_recording, exact, record
 from ..blind.cause_sizes import Cause, site, small_errors
 from ..blind.making import SealedCase, one_arm
-from ..blind.measures import NORMAL_90, TO_90, gap_on, nominal_on, rms
+from ..blind.scoring import NORMAL_90, TO_90, gap_on, nominal_on, rms
 from ..real_arms.unseen import flagged
 
 PART = (0.005, 0.1)

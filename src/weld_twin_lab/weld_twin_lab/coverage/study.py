@@ -30,7 +30,7 @@ from weld_twin_nodes.offline.task_pool import Task
 
 from ..blind.blind_cell import at_stations
 from ..blind.cause_sizes import small_errors
-from ..blind.measures import rms
+from ..blind.scoring import rms
 from ..plant.tracker import Tracker
 from ..programs.sealed_seams import CELLS
 from ..real_arms.sources import TUNED_ON, Split, all_splits

@@ -44,9 +44,8 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..belief.learning import Weights, fitted
-from ..blind.blind_cell import WAYS, as_recording, of_motion, record
+from ..blind.blind_cell import RATE, WAYS, Motion, as_recording, of_motion, record
 from ..blind.making import Lot, SealedCase, draw_case, lots, one_arm
-from ..blind.recorded_motion import RATE, Motion
 from ..blind.scoring import Judged, judge
 from ..blind.seal import text_digest
 from ..gate.mistakes import seen_from
@@ -131,7 +130,6 @@ def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | N
 def looped(
     cell: SealedCell, diagnosis: Mapping[str, Any], first: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return what came of one cell that was investigated after a first diagnosis."""
     rounds, end, answer = _looped(cell, cell.first, diagnosis, dict(first))
     return {
         'name': cell.name,

@@ -28,7 +28,7 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_report.history import Entry, observations
 from weld_twin_report.history.words import likely, named
 
-from ..blind.measures import NORMAL_90
+from ..blind.scoring import NORMAL_90
 from ..study import Study, require_simulator
 from .life import Cause, Event, Year, cause, diagnosed, draw, moved, set_up, year
 
@@ -303,7 +303,6 @@ def run_years(seed: int, years: int, cells: int, full: int, runner: Runner) -> d
 
 
 def _full(seed: int, number: int, bases: Sequence[Result], runner: Runner) -> dict[str, Any]:
-    """Return what a year that is diagnosed in full came to."""
     first = bases[0]
     year = lived(seed, number, first)
     tasks = [

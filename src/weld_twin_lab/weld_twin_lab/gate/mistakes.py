@@ -21,7 +21,7 @@ from weld_twin_core.recording import Measurements, Recording
 from ..blind.blind_cell import BlindCell, as_recording, draw_cell, poorer, record, take
 from ..blind.cause_sizes import FAMILIES, MOVING, OUTSIDE, Cause
 from ..blind.making import ROBOTS, STRATA, NotVisible, draw_causes
-from ..blind.measures import rms
+from ..blind.scoring import rms
 
 STEPS = ('station_step', 'tool_slip')
 """Causes that are mistakes of the set-up as well; they are drawn there."""

@@ -193,7 +193,6 @@ def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def table(content: Mapping[str, Any]) -> str:
-    """Return the result as a Markdown table."""
     ways = sorted({w for counts in content['named'].values() for w in counts} - NUMBERS)
     rows = [
         [
@@ -210,7 +209,6 @@ def table(content: Mapping[str, Any]) -> str:
 
 
 def page(content: Mapping[str, Any]) -> str:
-    """Return tables and misses as a page."""
     out = [
         '# The gate, measured',
         '[What is found and how](../../unsound.md). Every kind of mistake was made in recordings '

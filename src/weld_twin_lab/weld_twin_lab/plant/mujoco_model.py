@@ -172,7 +172,6 @@ def weigh(body: mujoco.MjsBody, mass: float, com: np.ndarray, inertia: float) ->
 def add_hinge(
     body: mujoco.MjsBody, arm: Arm, at: exponentials.Home, i: int, name: str, **options: Any
 ) -> mujoco.MjsJoint:
-    """Add a hinge or slide of joint i to its link."""
     link = at.links[i]
     axis = at.v[i] if arm.sliding[i] else at.omega[i]
     kind = mujoco.mjtJoint.mjJNT_SLIDE if arm.sliding[i] else mujoco.mjtJoint.mjJNT_HINGE

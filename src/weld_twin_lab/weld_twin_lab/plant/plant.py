@@ -91,7 +91,6 @@ class _Cell:
 
     @cached_property
     def pedestal(self) -> Pedestal:
-        """What the arm stands on."""
         return Pedestal(self.compliant, self.causes)
 
     def seen(self, t: np.ndarray, rng: np.random.Generator) -> Motion:

@@ -43,7 +43,7 @@ from weld_twin_nodes.offline.correcting import CorrectedProgram, corrected_progr
 from weld_twin_nodes.offline.task_pool import Task
 from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
-from ..blind.recorded_motion import RATE
+from ..blind.blind_cell import RATE
 from ..study import Study, engine_digest, head, require_simulator, tabled
 from .plain import REST, Driven, driven, evenly, tool_pose
 from .sealed_seams import CELLS, MEASURING, SealedSeam, drawn_as, reader_of, sealed_seam

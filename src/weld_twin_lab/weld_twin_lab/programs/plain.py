@@ -14,7 +14,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,47 +47,15 @@ def about(axis: int, angle: float) -> np.ndarray:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class ScrewArm:
-    """An arm as axes in its base at joint position zero, and its flange there."""
-
-    name: str
-    axes: np.ndarray
-    points: np.ndarray
-    """Direction of every axis, which its joint turns about by the right hand, and a point on it,
-    shape (n, 3) [1, m]."""
-    flange: np.ndarray
-    T_flange_tool: np.ndarray = field(default_factory=lambda: np.eye(4))
-    """Shape (4, 4) [m]."""
-
-    def frames(self, q: np.ndarray) -> list[np.ndarray]:
-        """Return a frame on every axis, z along it, and the flange, each of shape (4, 4)."""
-        done, out = np.eye(4), []
-        for axis, point, angle in zip(self.axes, self.points, q, strict=True):
-            on = np.eye(4)
-            on[:3, 2], on[:3, 3] = axis, point
-            out.append(done @ on)  # only z and the place of it are asked for
-            turn = np.eye(4)
-            turn[:3, :3] = Rotation.from_rotvec(angle * axis).as_matrix()
-            turn[:3, 3] = point - turn[:3, :3] @ point
-            done = done @ turn
-        return [*out, done @ self.flange]
-
-
-Arm = Robot | ScrewArm
-
-
 def tool_pose(
-    robot: Arm, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
+    robot: Robot, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
 ) -> np.ndarray:
     """Return the pose of the tool; ``offsets``: how much further each joint really stands."""
     return np.asarray(_frames(robot, q + offsets)[-1] @ tool)
 
 
-def _frames(robot: Arm, q: np.ndarray) -> list[np.ndarray]:
+def _frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     """Return the frame that each joint turns in, and the last frame, each of shape (4, 4)."""
-    if isinstance(robot, ScrewArm):
-        return robot.frames(q)
     at, out = np.eye(4), []
     rows = zip(robot.a, robot.alpha, robot.d, robot.theta + q, strict=True)
     for a, alpha, d, theta in rows:
@@ -101,7 +68,7 @@ def _frames(robot: Arm, q: np.ndarray) -> list[np.ndarray]:
     return [*out, at]
 
 
-def joints_for(robot: Arm, pose: np.ndarray, tool: np.ndarray, near: np.ndarray) -> np.ndarray:
+def joints_for(robot: Robot, pose: np.ndarray, tool: np.ndarray, near: np.ndarray) -> np.ndarray:
     """Return what a controller, which knows no error, makes of a pose."""
     q = np.array(near, dtype=float)
     for _ in range(ROUNDS):
@@ -157,7 +124,7 @@ class Driven(NamedTuple):
         return np.stack([np.interp(t, self.clock, column) for column in self.tool.T], axis=1)
 
 
-def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
+def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Driven:
     """
     Return what a controller makes of moves; it stands at the end of the first when it begins.
 
@@ -206,13 +173,15 @@ def _eased(clock: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return t, np.where(2.0 * t < end, gone, whole - gone)
 
 
-def _by_joints(robot: Arm, q: np.ndarray, place: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
+def _by_joints(
+    robot: Robot, q: np.ndarray, place: np.ndarray, tool: np.ndarray
+) -> list[np.ndarray]:
     end = place if place.ndim == 1 else joints_for(robot, place, tool, q)
     count = max(int(np.ceil(_length(robot, q, end, tool) / FINE)), 1)
     return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
 
 
-def _straight(robot: Arm, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
+def _straight(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
     begin = tool_pose(robot, q, tool)
     way = end[:3, 3] - begin[:3, 3]
     turn = Rotation.from_matrix(end[:3, :3] @ begin[:3, :3].T).as_rotvec()
@@ -227,7 +196,7 @@ def _straight(robot: Arm, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> l
     return out
 
 
-def _length(robot: Arm, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
+def _length(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
     first, last = tool_pose(robot, q, tool), tool_pose(robot, end, tool)
     turn = Rotation.from_matrix(last[:3, :3] @ first[:3, :3].T).as_rotvec()
     return _size(last[:3, 3] - first[:3, 3], turn)

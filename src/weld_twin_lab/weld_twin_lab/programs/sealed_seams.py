@@ -21,9 +21,8 @@ from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.programs import Context, controller_of
 from weld_twin_nodes.offline.exporting import Speeds, export
 
-from ..blind.blind_cell import BlindCell, as_recording, record
+from ..blind.blind_cell import RATE, BlindCell, as_recording, drawn_seam, record
 from ..blind.making import Lot, SealedCase, draw_case, lots, one_arm
-from ..blind.recorded_motion import RATE, drawn_seam
 from ..plant.exponentials import Command, PlantRecording
 from ..plant.plant import run
 from ..plant.tracker import Tracker

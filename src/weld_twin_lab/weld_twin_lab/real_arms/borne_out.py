@@ -30,7 +30,7 @@ from weld_twin_core.effects.plausible import plausible
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
 
-from ..blind.measures import rms
+from ..blind.scoring import rms
 from .rows import ArmRow, size
 
 TINY = 1e-12

@@ -20,7 +20,7 @@ from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files import markdown
 
-from ..blind.measures import bootstrap
+from ..blind.scoring import bootstrap
 from ..study import tabled
 from .sources import TUNED_ON, Split, all_splits, halves, servo
 from .unseen import ALIGN, PLAIN, flagged, plain_fit, residual, tried

@@ -379,7 +379,6 @@ def _row(name: str, a: float, d: float, alpha: float, theta: float) -> dict[str,
 
 
 def _table(path: Path) -> dict[str, Array]:
-    """Return the columns of a table of numbers by their heads."""
     if not path.is_file():
         raise DataError(f"'{path}' is missing; docs/real_arms.md says where the data come from")
     with path.open(newline='') as stream:

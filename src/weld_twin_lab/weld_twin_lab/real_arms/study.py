@@ -22,7 +22,7 @@ from weld_twin_nodes.offline.task_pool import Task
 
 from ..belief.learning import NAMES
 from ..belief.trial import write_rows
-from ..blind.measures import rms
+from ..blind.scoring import rms
 from ..study import Study, head, tabled
 from . import poor
 from .borne_out import Borne, borne_out

@@ -8,7 +8,7 @@ import pytest
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.assembly import Intake, Role
 from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recording, write_recording
-from weld_twin_msgs_py.bags.regular import Stream, fill_regular
+from weld_twin_msgs_py.bags.from_bag import Stream, fill_regular
 from weld_twin_msgs_py.messages.topics import TopicNames
 
 STORAGES = ('mcap', 'sqlite3')

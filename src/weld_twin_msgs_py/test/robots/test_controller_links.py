@@ -14,7 +14,7 @@ from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.errors import ModelError
 from weld_twin_core.motion.paths import default_seam
-from weld_twin_core.twin.corrected import corrected
+from weld_twin_core.twin.compensation import corrected
 from weld_twin_msgs_py.robots import load_robot, write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 

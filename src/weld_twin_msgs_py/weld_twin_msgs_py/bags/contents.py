@@ -92,7 +92,6 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
 
 
 def _topics_of(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[str, Any]]:
-    """Return the topics of a bag and what its writer said of it."""
     stamps: dict[str, array[int]] = {}
     unstamped: dict[str, int] = {}
     headers: set[str] = set()

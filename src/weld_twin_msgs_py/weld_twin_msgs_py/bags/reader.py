@@ -115,7 +115,6 @@ def _listed(path: Path) -> Bag:
 
 
 def _named(made: dict[str, Any]) -> list[str]:
-    """Return the names of the files that metadata lists."""
     return [PurePath(str(name)).name for name in made['relative_file_paths']] if made else []
 
 
@@ -204,7 +203,6 @@ def unlz4(data: bytes, size: int | None = None) -> bytes:
 
 
 def unpack_file(packed: Path, out: Path) -> None:
-    """Unpack a zstd file."""
     most = max(SMALL, RATIO * packed.stat().st_size)
     free = shutil.disk_usage(out.parent).free
     with packed.open('rb') as raw:

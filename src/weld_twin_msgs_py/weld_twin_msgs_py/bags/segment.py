@@ -130,7 +130,6 @@ class Segment:
         return known
 
     def write(self, channel: Channel, data: bytes, log_ns: int) -> None:
-        """Write a serialised message."""
         self._writer.write(self.announce(channel), log_ns, data)
         size = len(data) + OVERHEAD
         self.size += size
@@ -231,7 +230,6 @@ def clear_write_errors(path: Path, remaining: Callable[[], str] = str) -> Iterat
 
 
 def check_storage(storage: str) -> str:
-    """Return the name of a storage."""
     if storage not in STORAGES:
         raise DataError(f'storage must be one of {", ".join(STORAGES)}, got {storage!r}')
     return storage

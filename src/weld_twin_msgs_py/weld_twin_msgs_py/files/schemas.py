@@ -10,8 +10,7 @@ from weld_twin_core.contacts import KINDS as CONTACTS
 from weld_twin_core.effects import REGISTRY, Effect
 from weld_twin_core.effects.plausible import table
 from weld_twin_core.motion.paths import Torch, Weave
-from weld_twin_core.motion.paths.seams import FORMS, SEAMS
-from weld_twin_core.motion.paths.torch import HEADINGS
+from weld_twin_core.motion.paths.seams import FORMS, HEADINGS, SEAMS
 
 DRAFT = 'http://json-schema.org/draft-07/schema#'
 """The draft that editors know best."""

@@ -91,7 +91,6 @@ def read_text(path: Path | str, kind: str) -> str:
 
 
 def read_yaml(path: Path | str, kind: str) -> Any:
-    """Return the data of a YAML file."""
     return parse_yaml(read_text(path, kind), f"{kind} '{path}'")
 
 

@@ -149,7 +149,6 @@ class Program:
 
     @property
     def steps(self) -> list[Step]:
-        """Return all moves."""
         return [step for piece in self.pieces for step in piece]
 
 

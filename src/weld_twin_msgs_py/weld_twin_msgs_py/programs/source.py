@@ -197,7 +197,6 @@ class Number(NamedTuple):
 
 
 def read_source(path: Path | str) -> Source:
-    """Return the text of a file."""
     try:
         with Path(path).open('rb') as file:
             raw = file.read(SIZE_LIMIT + 1)

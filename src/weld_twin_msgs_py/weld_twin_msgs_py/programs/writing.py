@@ -50,7 +50,6 @@ class Exported:
 
     @property
     def external(self) -> tuple[ExternalAxis, ...]:
-        """Return the external axes that the controller has."""
         return self.context.controller.external
 
     def labelled(self, move: ExportMove, own: str) -> dict[str, float]:
@@ -113,7 +112,6 @@ LOADING: dict[str, tuple[str, str, str]] = {
 
 
 def sheet(program: Exported, language: str, file: str, speeds: str, notes: Sequence[str]) -> str:
-    """Return the sheet as Markdown."""
     load, record, output = (text.format(trigger=program.trigger) for text in LOADING[language])
     when = 'while the arm stands' if program.stations else 'from the first to the last move'
     minutes = sum(m.duration + m.dwell for m in program.moves) / 60.0
@@ -372,7 +370,6 @@ def _body(
     wait: Callable[[float], str],
     remark: str,
 ) -> list[str]:
-    """Return the moves with stays and trigger between them."""
     rows: list[str] = []
     for k, step in enumerate(program.moves):
         rows += [remark.format(step.comment)] if step.comment else []

@@ -14,15 +14,18 @@ from weld_twin_core.arm.robot import STANDARD_GRAVITY, Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
-from .controller_links import FLANGE, FixedLink, flange_link_of, foot_of
 from .urdf_tree import (
     CORRECTED,
+    FLANGE,
     MOVABLE,
     TURN,
     Axis,
+    FixedLink,
     Joint,
     Tree,
     dh_rows,
+    flange_link_of,
+    foot_of,
     inverse,
     parse_tree,
     read_tree,
@@ -100,7 +103,6 @@ class Chain(NamedTuple):
 
 
 def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | None = None) -> Chain:
-    """Return the joints from base to tip."""
     tree = read_tree(path)
     base = _base(tree, base_link)
     return _chain(tree, base, _tip(tree, base, tip_link))

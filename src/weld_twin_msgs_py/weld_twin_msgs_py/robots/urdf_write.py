@@ -18,9 +18,8 @@ from weld_twin_core.arrays import Array
 
 from ..files.whole_files import write_text
 from ..files.yaml_file import read_text
-from .controller_links import BASE, FLANGE
 from .urdf_read import Chain, chain_of, read_urdf
-from .urdf_tree import MOVABLE, Joint, inverse, read_tree, turn
+from .urdf_tree import BASE, FLANGE, MOVABLE, Joint, inverse, read_tree, turn
 
 EFFORT = '1000.0'
 ROOT = 'root'

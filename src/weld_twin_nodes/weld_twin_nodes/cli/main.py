@@ -163,7 +163,6 @@ def _add(subparsers: argparse._SubParsersAction[Parser], name: str, chosen: str)
 
 
 def _row(name: str) -> Command:
-    """Return what the table of its package says of a command."""
     row: Command = import_module(COMMANDS[name]).ROWS[name]
     return row
 

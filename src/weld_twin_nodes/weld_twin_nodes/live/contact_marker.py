@@ -49,7 +49,6 @@ class Part:
 
     @property
     def newest(self) -> tuple[int, np.ndarray]:
-        """Return the last sample."""
         return self._lately[-1]
 
     @property

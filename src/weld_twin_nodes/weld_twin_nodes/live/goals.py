@@ -228,7 +228,6 @@ class GoalRelay:
 
 
 def _action_of(node: CellNode, controller: str) -> str:
-    """Return the name of a controller's action."""
     own = controller.rstrip('/')
     below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
     try:

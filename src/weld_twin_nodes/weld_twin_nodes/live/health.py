@@ -102,7 +102,6 @@ class Input:
         self._before = (time.monotonic(), 0, 0, 0)
 
     def arrived(self) -> None:
-        """Count a message."""
         now = time.monotonic()
         if now - self.last <= self._patience:
             self._pauses.clear()

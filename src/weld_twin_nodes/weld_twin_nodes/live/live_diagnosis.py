@@ -251,7 +251,6 @@ class LiveDiagnosis(ManagedNode):
         self._window.take(role, message)
 
     def time_went_back(self) -> None:
-        """Forget the window."""
         if self._measured is not None:
             self._measured.clear()
         self._window.reset()

@@ -275,14 +275,12 @@ class Shortfall(NamedTuple):
     where: str  # 'at the start', 'at the end', 'at both ends', or 'in between'
 
     def sentence(self, topic: str) -> str:
-        """Return it in words."""
         return (
             f"'{topic}' is incomplete: {self.recorded:,} of {self.sent:,} messages sent are in "
             f'the bag, {self.sent - self.recorded:,} are missing {self.where}'
         )
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return plain values."""
         missing = self.sent - self.recorded
         return {
             'sent': self.sent,

@@ -240,7 +240,6 @@ class Counted:
 
     @property
     def tellers(self) -> list[str]:
-        """Return the nodes that tell counts."""
         return sorted({node for node, _ in self._sent})
 
     @property

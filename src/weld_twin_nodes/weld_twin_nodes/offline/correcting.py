@@ -266,7 +266,6 @@ def move_rows(made: CorrectedProgram) -> list[dict[str, Any]]:
 
 
 def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[str, Any]:
-    """Return the content of correction.json."""
     before, after = made.accuracy
     return {
         'schema': SCHEMA,
@@ -424,7 +423,6 @@ class LoadedModel:
 
 
 def loaded(robot: Robot, path: str) -> LoadedModel:
-    """Return the model of a file."""
     if not path:
         raise ModelError("the compensator needs the parameter 'model': a diagnosis.json")
     file = Path(path)

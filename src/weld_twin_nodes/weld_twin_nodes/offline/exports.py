@@ -14,7 +14,7 @@ from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import left_behind, of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
-from weld_twin_core.twin.corrected import corrected, joint_offsets
+from weld_twin_core.twin.compensation import corrected, joint_offsets
 from weld_twin_core.twin.posterior import Posterior
 from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.effects_file import head_of

@@ -76,7 +76,6 @@ class Simulation:
         return self.twin.poses(self.recording)
 
     def deviations(self) -> Iterator[tuple[Deviation, dict[str, float | int]]]:
-        """Yield each deviation with the metrics up to it."""
         analyzer = Deviations(self.twin.robot, self.path_length)
         measured = zip(_late(self.stamps, self.real), self.measured.position, strict=True)
         expected = zip(_late(self.stamps, self.twin), self.expected.position, strict=True)

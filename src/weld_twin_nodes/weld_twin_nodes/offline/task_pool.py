@@ -6,17 +6,20 @@ Many independent tasks, on the cores of this machine or on a Dask cluster, and r
 A task is a function of a module and its arguments, and returns plain data (what JSON can hold,
 arrays become lists). Wherever a task runs, its result passes through JSON, so that a study on one
 core, on many, on a cluster and one that was resumed give identical numbers.
+
+Results are kept by a name for the content of values: equal content, equal name, on every machine.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,8 +30,45 @@ from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 
-from .content_hash import digest
 from .environment import THREADS, environment
+
+
+def digest(*values: Any) -> str:
+    """Return 32 hexadecimal digits that stand for plain values, arrays, functions, dataclasses."""
+    state = hashlib.sha256()
+    for value in values:
+        _feed(state, value)
+    return state.hexdigest()[:32]
+
+
+def _feed(state: Any, value: Any) -> None:
+    if isinstance(value, np.ndarray | np.generic):
+        array = np.ascontiguousarray(value)
+        state.update(f'a{array.dtype.str}{array.shape}'.encode())
+        state.update(array.tobytes())
+    elif value is None or isinstance(value, bool | int | float | str | bytes):
+        text = repr(value).encode()
+        state.update(f'{type(value).__name__}{len(text)}:'.encode() + text)
+    elif isinstance(value, type) or (callable(value) and not is_dataclass(value)):
+        _feed(state, f'{value.__module__}.{value.__qualname__}')
+    elif is_dataclass(value):
+        _feed(state, type(value))
+        for field in fields(value):
+            _feed(state, field.name)
+            _feed(state, getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        state.update(f'm{len(value)}'.encode())
+        for key in sorted(value, key=repr):
+            _feed(state, key)
+            _feed(state, value[key])
+    elif isinstance(value, Sequence | frozenset | set):
+        items = sorted(value, key=repr) if isinstance(value, frozenset | set) else value
+        state.update(f's{len(value)}'.encode())
+        for item in items:
+            _feed(state, item)
+    else:
+        raise DataError(f'a {type(value).__name__} has no content to name a task by')
+
 
 Plain = Any
 """What JSON can hold."""
@@ -46,7 +86,6 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Return the name of its result."""
         return digest(__version__, self.function, *self.arguments)
 
 

@@ -130,7 +130,6 @@ class Verification:
     notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the content of verification.json."""
         low, high = self.promised.low, self.promised.high
         return {
             'schema': SCHEMA,

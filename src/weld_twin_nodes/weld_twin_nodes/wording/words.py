@@ -117,7 +117,6 @@ def parameter_word(name: str) -> str:
 
 
 def capital(text: str) -> str:
-    """Return a text that begins with a capital letter."""
     return f'{text[:1].upper()}{text[1:]}'
 
 
@@ -226,7 +225,6 @@ def same_words(diagnosis: Diagnosis, *sites: Site) -> list[str]:
 
 
 def named_causes(diagnosis: Diagnosis) -> list[Cause]:
-    """Return the causes that have a name."""
     return [one for one in diagnosis.causes if one.name and not one.rest]
 
 
@@ -242,7 +240,6 @@ def open_sites(diagnosis: Diagnosis) -> set[Site]:
 
 
 def site_of(result: Found) -> Site:
-    """Return the site of an effect that was found."""
     return Site(result.effect.name, result.effect.site)
 
 

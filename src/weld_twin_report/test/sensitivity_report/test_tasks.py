@@ -19,7 +19,6 @@ from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.sensitivity import default_tolerances
 from weld_twin_core.twin.twin import Twin
-from weld_twin_nodes.offline.content_hash import digest
 from weld_twin_nodes.offline.task_pool import (
     Cluster,
     Cores,
@@ -27,6 +26,7 @@ from weld_twin_nodes.offline.task_pool import (
     Runner,
     Task,
     available_cores,
+    digest,
     pool_of,
 )
 from weld_twin_report.sensitivity_report import Effort, Setting

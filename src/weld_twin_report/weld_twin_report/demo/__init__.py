@@ -41,7 +41,6 @@ where no controller's action is installed."""
 
 
 def plan_seam(job: analysis.Job, _: object) -> None:
-    """Plan the seam as joint motion."""
     job.plan = plan_motion(job.robot, job.seam, 'smooth', job.rate)
 
 

@@ -160,7 +160,6 @@ def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> H
 
 
 def _shown(entries: Sequence[Entry], begins: Mapping[str, float]) -> list[str]:
-    """Return the coordinates that are drawn."""
     named = [
         f'{each["effect"]} {each["joint"]} 0'
         for each in entries[-1].effects

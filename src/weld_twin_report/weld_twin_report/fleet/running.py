@@ -28,9 +28,8 @@ from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.scratch import Scratch
 from weld_twin_msgs_py.robots.load import as_file
-from weld_twin_nodes.offline.content_hash import digest
 from weld_twin_nodes.offline.output_directory import new_directory
-from weld_twin_nodes.offline.task_pool import Pool, Task, available_cores, call
+from weld_twin_nodes.offline.task_pool import Pool, Task, available_cores, call, digest
 
 from ..guarded import Guarded, Limits, Outcome
 from ..history import Unavailable, entry_of

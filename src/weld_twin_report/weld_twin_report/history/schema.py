@@ -129,15 +129,7 @@ def _nothing_yet(shown: str) -> str:
 
 FIRST_WAIT, LONGEST_WAIT = 0.02, 1.0
 """Seconds before the second attempt, and at most before any; each wait is twice the last one."""
-_STATES = (
-    '40001',  # could not be put in an order with the others
-    '40P01',  # each waits for the other
-    '55P03',  # locked
-    '57P01',  # the server is stopped
-    '57P02',  # it has crashed
-    '57P03',  # it starts
-    '53300',  # too many connections
-)
+_STATES = ('40001', '40P01', '55P03', '57P01', '57P02', '57P03', '53300')
 """SQLSTATE codes of PostgreSQL that pass by themselves."""
 _CONNECTION = '08'
 """Class of its codes that tell of a lost connection."""

@@ -47,7 +47,6 @@ def _steady(name: str) -> bool:
 
 
 def named(entries: Sequence[Entry]) -> set[str]:
-    """Return the coordinates of the causes that entries name."""
     result = ((each['effect'], each.get('joint')) for entry in entries for each in entry.effects)
     return {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in result}
 

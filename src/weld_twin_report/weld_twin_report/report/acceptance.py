@@ -140,7 +140,6 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
 
 
 def _mended_words(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
-    """Return in words which causes are thought mended."""
     labels = [switch.label for switch in switches(diagnosis)]
     if not mended:
         return f'as it is{_where(diagnosis)}'

@@ -88,7 +88,6 @@ def _not_seen(result: ContactResult) -> Html | None:
 
 
 def _pictures(diagnosis: Diagnosis) -> list[Html]:
-    """Return a picture per contact."""
     out: list[Html] = []
     traces = diagnosis.traces
     for recording, before, after in zip(

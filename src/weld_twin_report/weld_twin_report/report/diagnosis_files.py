@@ -30,7 +30,6 @@ _SETTLED_MS = 3000
 
 
 def browser() -> str:
-    """Return the browser to print with."""
     result = next(filter(None, map(shutil.which, BROWSERS)), None)
     if result is None:
         raise DataError(
@@ -41,7 +40,6 @@ def browser() -> str:
 
 
 def print_page(page: Path, out: Path) -> None:
-    """Print a page to a PDF."""
     program = browser()
     with tempfile.TemporaryDirectory() as profile:
         command = [

@@ -135,7 +135,6 @@ def _words(_: Answer) -> Html:
 
 
 def figures(answer: Answer) -> Html:
-    """Return the figures that answer what is asked first."""
     diagnosis = answer.diagnosis
     rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, answer.rule), _left(diagnosis)]
     if diagnosis.status in _SURE_OF:
@@ -237,7 +236,6 @@ def _among(diagnosis: Diagnosis) -> str:
 
 
 def _data(answer: Answer) -> Figure | None:
-    """Return how the checks of the data came out."""
     diagnosis = answer.diagnosis
     checks = diagnosis.checks
     if not checks:

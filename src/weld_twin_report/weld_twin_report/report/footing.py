@@ -70,7 +70,6 @@ def measured_next(diagnosis: Diagnosis) -> str | None:
 
 
 def _sites(diagnosis: Diagnosis) -> set[Site]:
-    """Return the sites that sentences may speak of."""
     named = {site for group in diagnosis.indistinguishable for site in group}
     return named | {candidate.site for candidate in diagnosis.candidates}
 

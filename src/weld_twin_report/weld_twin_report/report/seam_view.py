@@ -54,7 +54,6 @@ def seam_section(page: Content) -> Html | None:
 
 
 def _switches(diagnosis: Diagnosis) -> Html | None:
-    """Return a box to tick for every cause."""
     result = switches(diagnosis)
     if not result:
         return None

@@ -201,7 +201,6 @@ def _takes(diagnosis: Diagnosis) -> str:
 
 
 def _proposed(diagnosis: Diagnosis) -> str:
-    """Return the file that holds the next experiment."""
     touches = (diagnosis.next_experiment or {}).get('kind') == 'touches'
     return 'next_touches.csv' if touches else 'next_experiment.yaml'
 

@@ -156,7 +156,6 @@ def run_claims(
 
 
 def claims_markdown(result: dict[str, Any]) -> str:
-    """Return the table for reading."""
     rows = [('Claim', 'In the paper', 'Holds as written', 'Verdict', 'Why, as measured')]
     for c in result['claims']:
         share = f'{c["held"]} of {c["cases"]}'

@@ -27,8 +27,7 @@ from weld_twin_core.sensitivity import (
 from weld_twin_core.sensitivity.local import posture
 from weld_twin_core.sensitivity.seam_study import joined
 from weld_twin_core.sensitivity.sweep import end_of_linearity
-from weld_twin_nodes.offline.content_hash import digest
-from weld_twin_nodes.offline.task_pool import Runner, Task
+from weld_twin_nodes.offline.task_pool import Runner, Task, digest
 
 from .setting import RECORDED, Setting, recorded_deviations
 
@@ -67,7 +66,6 @@ Design = SobolDesign | MorrisDesign | StackDesign
 
 
 def count_of(design: Design) -> int:
-    """Return how many runs a design has."""
     if isinstance(design, SobolDesign):
         return design.base_samples * (len(design.labels) + 2)
     if isinstance(design, MorrisDesign):
@@ -263,7 +261,6 @@ class _Designs:
         self._morris = MorrisDesign(names, effort.trajectories, effort.seed)
 
     def label(self, what: str) -> str:
-        """Return the label of some of the runs."""
         return f'{self._motion}: {what}'
 
     def jobs(self, study: Study) -> dict[str, Job]:

@@ -91,7 +91,6 @@ class Job:
 
     @classmethod
     def read(cls, folder: Path) -> Job:
-        """Return the job of a folder."""
         try:
             if not (folder / FILE).is_file():  # a pipe would be waited for
                 raise ValueError('it is no file')
@@ -165,7 +164,6 @@ class Job:
         return [*first, last + ['--apply'] * self.asked.apply]
 
     def _correct(self, place: Path) -> list[str]:
-        """Return the words that correct a program."""
         robot = self.asked.robot
         robot = f'{MODEL}/{robot}' if robot.lower().endswith(OTHERS) else robot
         out = [CORRECT, str(place / main_file(self.names)), '--robot', robot]

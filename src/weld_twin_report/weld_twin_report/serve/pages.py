@@ -75,7 +75,6 @@ def page(title: str, *body: Child, site: Site, refresh: int | None = None) -> st
 
 
 def start_page(site: Site, said: str = '') -> str:
-    """Return the page on which a recording is dropped."""
     robots = [('', 'choose, or drop its file'), *((n, n) for n in robot_names())]
     hint = (
         'Drop it here: a table (.csv), or a bag (.mcap, or all its files). The file of your own '
@@ -97,7 +96,6 @@ def start_page(site: Site, said: str = '') -> str:
 
 
 def _form(place: str, *children: Child, kind: str = 'form') -> Html:
-    """Return a form that is sent to a place of this server."""
     return tag(kind, *children, action=place, method='post', enctype='multipart/form-data')
 
 
@@ -106,7 +104,6 @@ def _submit(text: str) -> Html:
 
 
 def _button(text: str, place: str) -> Html:
-    """Return a button that changes something."""
     return _form(place, tag('button', text, type='submit'), kind='form.small')
 
 
@@ -163,7 +160,6 @@ def _said(text: str, command: str = '') -> Html | None:
 
 
 def recordings_page(jobs: Sequence[Job], site: Site) -> str:
-    """Return the list of a user's recordings."""
     shown: dict[str, Callable[[Job], Child]] = {
         'dropped': lambda job: tag('a.date', _when(job), href=f'/recordings/{job.key}'),
         'files': lambda job: ', '.join(job.names[:2]) + ' ...' * (len(job.names) > 2),
@@ -357,7 +353,6 @@ def me_page(key: str, site: Site, said: str = '') -> str:
 
 
 def message_page(title: str, text: str, site: Site) -> str:
-    """Return a page that says one thing."""
     return page(title, section(title.capitalize(), tag('p', text), id_='message'), site=site)
 
 

@@ -281,7 +281,6 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 
 
 def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
-    """Return what a form asks of a program and its model."""
     return Asked(_robot(form, names), told=given(_texts(form), (CORRECT,)))
 
 

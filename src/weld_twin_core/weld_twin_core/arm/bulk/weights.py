@@ -30,7 +30,7 @@ from ..robot import Robot
 from ..rotation import skew
 
 _HALF_ANGLE = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]])
-"""(1, c, s) = (1, u, v) @ _HALF_ANGLE, with u and v as in `half_angle`."""
+"""(1, c, s) = (1, u, v) @ _HALF_ANGLE, with u and v as in `bulk_kernel`."""
 
 
 _TURNS = np.stack([skew(axis) for axis in np.eye(3)])

@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
-from ...twin.memory import Picker
+from ...twin.stages import Picker
 from .columns import Maker, Piece, Rows, rows_of
 from .definite import outside, span_of
 from .fit import design

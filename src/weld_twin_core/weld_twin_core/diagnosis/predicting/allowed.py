@@ -34,8 +34,8 @@ from ...effects.dated import of_the_robot
 from ...twin.directions import Directions
 from ...twin.domain import Domain
 from ...twin.features import shown
+from ...twin.goal_motion import is_play, lost_motion
 from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
-from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, PROBE, Fit

@@ -21,7 +21,7 @@ from ...effects import REGISTRY
 from ...effects.dated import of_the_robot
 from ...effects.effect import Effect
 from ...effects.geometry import ChannelError, FrameError
-from ...twin.corrected import corrected
+from ...twin.compensation import corrected
 from ...twin.features import joints_of
 from ..algebra.fit import effect_precision, fit, frame_offset, trusted
 from ..algebra.problem import ROWS, Alone, Model, Problem, Scale

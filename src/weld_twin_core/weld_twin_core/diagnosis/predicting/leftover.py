@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from ...arrays import Array, spread_over
-from ...twin.reversals import just_turned
+from ...twin.goal_motion import just_turned
 from ..algebra.definite import unit_diagonal
 from ..algebra.fit import trusted
 from ..algebra.independent_rows import ENOUGH

@@ -21,8 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arm.chain import frames
-from ...arm.mounting import rising
+from ...arm.chain import frames, rising
 from ...arm.robot import Robot
 from ...arrays import Array, halton
 from ...errors import DataError

@@ -18,8 +18,7 @@ import numpy as np
 from ...arrays import Array
 from ...bundle import adjusted
 from ...cameras import Sightings
-from ...cameras.bodies import located
-from ...cameras.sightings import Fitted
+from ...cameras.sightings import Fitted, located
 from ...errors import DataError
 from ..algebra.definite import outside, span_of
 from ..algebra.problem import ROWS

@@ -26,7 +26,7 @@ from ...effects.compliance import PedestalTilt, base_leans, base_moments
 from ...effects.curves import QUANTITIES, FrameCurve, JointCurve, basis
 from ...effects.effect import Effect
 from ...twin.features import Features
-from ...twin.memory import Picker
+from ...twin.stages import Picker
 from ..algebra.independent_rows import ENOUGH
 from ..algebra.negligible import FLAT, ROUNDING
 from ..algebra.problem import Model, Problem, Scale

@@ -13,8 +13,18 @@ Examples
 """
 
 from .bundled import KINDS, default_seam
-from .seams import Arc, Circle, Line, Path, Polyline, SeamFrames, Spline, Weave, from_mapping
-from .torch import Torch
+from .seams import (
+    Arc,
+    Circle,
+    Line,
+    Path,
+    Polyline,
+    SeamFrames,
+    Spline,
+    Torch,
+    Weave,
+    from_mapping,
+)
 
 __all__ = ['KINDS', 'Arc', 'Circle', 'Line', 'Path', 'Polyline', 'SeamFrames', 'Spline', 'Torch']
 __all__ += ['Weave', 'default_seam', 'from_mapping']

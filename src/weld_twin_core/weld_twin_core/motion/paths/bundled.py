@@ -9,15 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arm.mounting import rising, up
+from ...arm.chain import rising, up
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array
 from ...errors import PathError, ReachError
 from ..inverse import CarriedArm, rest, solve_path
 from ..inverse.along_path import reach
-from .seams import Arc, Circle, Line, Path, Polyline, Spline, Weave
-from .torch import Torch
+from .seams import Arc, Circle, Line, Path, Polyline, Spline, Torch, Weave
 
 _COMFORT_LIMIT = 0.15
 """Distance to a joint limit [rad] from which a place is as good as any."""

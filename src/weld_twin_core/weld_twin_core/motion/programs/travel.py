@@ -307,7 +307,6 @@ def _joint_move(chain: CarriedArm, course: _Course, move: Move, q: Array | None)
 def _posture(
     chain: CarriedArm, pose: Array, course: _Course, move: Move, q: Array | None
 ) -> Array:
-    """Return the joint positions in which a move reaches a pose."""
     assert move.end is not None
     arm, external = chain.robot, course.program.external_at(move.end)
     result = chain.solve(pose, external, q)

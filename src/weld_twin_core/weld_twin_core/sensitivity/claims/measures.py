@@ -63,12 +63,10 @@ class _Case:
 
     @cached_property
     def smooth(self) -> Study:
-        """Return the smooth motion."""
         return planned_study(self.robot, self.path, 'smooth', points=_POINTS)
 
     @cached_property
     def aggressive(self) -> Study:
-        """Return the aggressive motion."""
         return self.reversing(10)
 
     def reversing(self, reversals: int, points: int = _POINTS) -> Study:
@@ -78,7 +76,6 @@ class _Case:
 
     @cached_property
     def local(self) -> LocalSensitivity:
-        """Return the local sensitivities of the smooth motion."""
         return local_sensitivity(self.smooth, self.tolerances)
 
     @property

@@ -14,7 +14,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ...blind.measures import rms
+from ...blind.scoring import rms
 from ..course import ContestAnswer, ContestCase
 from .geometry import as_causes, nominal, off
 

@@ -35,7 +35,6 @@ def read_joint_targets(path: Path, text: str, marker: str | None) -> Read:
 
 
 def _joints(line: str) -> list[tuple[list[str], list[str]]]:
-    """Return arm and external axes of every target in a line."""
     out = []
     for match in _JOINT_TARGET.finditer(line):
         arm, ext = ([cell.strip() for cell in part.split(',')] for part in match.groups())

@@ -92,7 +92,6 @@ def _there_already(database: Database, cell: str, entry: Entry | Verified) -> st
 
 
 def _verdict(entry: Entry | Verified) -> list[str]:
-    """Return status and causes of a diagnosis."""
     causes = '' if isinstance(entry, Verified) else words.causes_of(entry.effects)
     return [text for text in (entry.status, causes) if text]
 
@@ -200,7 +199,7 @@ def run(given: Given) -> int:
 def page(given: Given) -> int:
     """Write a page that ranks cells, and one for each cell."""
     from weld_twin_msgs_py.files.whole_files import write_text
-    from weld_twin_nodes.offline.content_hash import digest
+    from weld_twin_nodes.offline.task_pool import digest
 
     from ...fleet.cell_page import page_of
     from ...fleet.ranking_page import ranking_page

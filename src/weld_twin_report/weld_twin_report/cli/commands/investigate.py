@@ -88,7 +88,6 @@ def _planned(given: Given) -> int:
 
 
 def _first(given: Given, robot: Robot, tolerance: float) -> Planned:
-    """Return the plan of a first measurement."""
     from weld_twin_core.diagnosis.predicting.planned import plan_stations
     from weld_twin_nodes.offline.measurement_plan import planned
 

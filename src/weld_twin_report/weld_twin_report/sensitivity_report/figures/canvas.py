@@ -20,16 +20,7 @@ if TYPE_CHECKING:
 
 Table = Mapping[str, Array]
 """Columns of one length; their names carry the unit."""
-COLOURS = (
-    '#0072b2',
-    '#d55e00',
-    '#009e73',
-    '#cc79a7',
-    '#e69f00',
-    '#56b4e9',
-    '#666666',
-    '#000000',
-)
+COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#666666', '#000000')
 """Okabe and Ito's, which people with any colour vision tell apart."""
 WIDTH = 9.0
 """Width of a figure [inch]."""
@@ -78,7 +69,6 @@ def panels(count: int, height: float = 3.1, **options: Any) -> tuple[Figure, Seq
 
 
 def label(axes: Axes, title: str, x: str, y: str) -> None:
-    """Set the title of a panel and of its axes."""
     axes.set_title(title, loc='left', fontsize=9.5)
     axes.set_xlabel(x)
     axes.set_ylabel(y)

@@ -85,6 +85,15 @@ def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     assert all(part in sentence for part in parts), sentence
 
 
+@pytest.mark.parametrize('name', ['base_pose', 'instrument_knock'])
+def test_a_turn_is_told_about_the_axes_of_a_base_that_is_turned_itself(ur5, name):
+    quarter = np.array([[0.0, -1.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+    turned = ur5.with_frames(base=np.vstack([quarter, [0.0, 0.0, 0.0, 1.0]]))
+    sentence = said(turned, effect=name, xyz=[2e-4, 0.0, 0.0], rotvec=[0.0, 9e-4, 0.0])
+    assert '+0.200 mm along axis x of the measuring frame' in sentence
+    assert '+0.0516 deg about axis x of the base' in sentence
+
+
 OF_CELLS = ('root_pose', 'guide_bend', 'guide_tilt')
 
 

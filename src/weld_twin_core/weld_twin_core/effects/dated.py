@@ -22,7 +22,7 @@ from ..recording import Recording
 from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
 from .geometry import ChannelError, FrameError, JointOffset, frame_parameters
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
-from .wording import base_frame, frame, radians
+from .wording import radians
 
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
@@ -144,8 +144,7 @@ class ToolSlip(_SuddenFrame):
 
     def remedy(self, robot: Robot) -> str:
         return (
-            f'Fasten the tool or the reflector: it moved by '
-            f'{frame(self.vector()[:6], "of the flange", "of the tool")} at '
+            f'Fasten the tool or the reflector: it moved by {self.in_words(robot)} at '
             f't = {self._plain("time"):.4g}; measure its centre point again.'
         )
 
@@ -172,7 +171,7 @@ class InstrumentKnock(_SuddenFrame):
 
     def remedy(self, robot: Robot) -> str:
         return (
-            f'Fasten the instrument and the base: one moved by {base_frame(self.vector()[:6])} at '
+            f'Fasten the instrument and the base: one moved by {self.in_words(robot)} at '
             f't = {self._plain("time"):.4g}; measure what came before and after apart.'
         )
 
@@ -216,8 +215,9 @@ class SetupStep(_SetupMotion):
                 yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
 
     def remedy(self, robot: Robot) -> str:
+        before = self.with_vector(-self.vector())
         return (
-            f'Fasten the set-up: it moved by {base_frame(-self.vector()[:6])} at '
+            f'Fasten the set-up: it moved by {before.in_words(robot)} at '
             f'{self._plain("time"):.4g} s; measure what came before and after apart.'
         )
 
@@ -258,7 +258,7 @@ class SetupSettling(_SetupMotion):
 
     def remedy(self, robot: Robot) -> str:
         return (
-            f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
+            f'Let the set-up settle before measuring: it started {self.in_words(robot)} from '
             'where it ended.'
         )
 

@@ -19,7 +19,7 @@ from ..arm.known_arms import controller_frames
 from ..arm.rotation import rotation_matrix, transform
 from .effect import Hooked, LinearEffect, SearchHooks, register
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View, single
-from .wording import base_frame, controller_pose, frame, metres, radians, stands, to_mend
+from .wording import controller_pose, frame, metres, radians, stands, to_mend
 
 _URS = (
     'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
@@ -222,6 +222,36 @@ class FrameError(LinearEffect):
     def per_unit(self, view: View) -> list[Shift]:
         return [single((self.channel, k), np.ones(()), view) for k in range(6)]
 
+    def told(self, robot: Robot) -> Array:
+        """
+        Return the step as people are told it, shape (6,) [m, rad], along and about `_TOLD_ALONG`.
+
+        The rows of a robot begin and end elsewhere than its controller has base and flange.
+        """
+        step, place = self.vector(), controller_frames(robot)
+        if self.channel == 'tool':
+            return np.concatenate([place.flange[:3, :3].T @ step[:3], step[3:]])
+        if self.channel == 'root':
+            foot = np.linalg.inv(robot.T_root_base)[:3, :3]
+            return np.concatenate([robot.T_base_foot[:3, :3].T @ step[:3], foot.T @ step[3:]])
+        rows = robot.T_world_base[:3, :3]
+        base = np.eye(4) if robot.behind else place.base
+        lever = rows @ base[:3, 3]
+        swing = rotation_matrix(step[3:]) @ lever - lever
+        return np.concatenate([step[:3] + swing, (rows @ base[:3, :3]).T @ step[3:]])
+
+    def in_words(self, robot: Robot) -> str:
+        """Return the step in mm and degrees, with whose axes they are."""
+        return frame(self.told(robot), *_TOLD_ALONG[self.channel])
+
+
+_TOLD_ALONG = {
+    'base': ('of the measuring frame', 'of the base'),
+    'root': ('of the base', 'of the positioner'),
+    'tool': ('of the flange', 'of the tool'),
+}
+"""Along and about whose axes the step of a frame is told."""
+
 
 @register
 class BasePose(FrameError):
@@ -246,10 +276,9 @@ class BasePose(FrameError):
     def remedy(self, robot: Robot) -> str:
         if robot.behind:
             return self._on_the_workpiece(robot)
-        moved = base_frame(_of_the_origin(self.vector(), robot))
         return (
-            f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
-            'moved: check the bolts of its foot.'
+            f'Correct the base frame by {self.in_words(robot)}. If it was right when it was '
+            'measured, the arm has moved: check the bolts of its foot.'
         )
 
     def _on_the_workpiece(self, robot: Robot) -> str:
@@ -262,13 +291,6 @@ class BasePose(FrameError):
             f'{after} in place of {before}. If it was right '
             'when it was measured, the fixture has moved, or another one is there.'
         )
-
-
-def _of_the_origin(step: Array, robot: Robot) -> Array:
-    """Return the move of the base of the rows, (6,) [m, rad], as one of the controller's base."""
-    lever = robot.T_world_base[:3, :3] @ controller_frames(robot).base[:3, 3]
-    swing = rotation_matrix(step[3:]) @ lever - lever
-    return np.concatenate([step[:3] + swing, step[3:]])
 
 
 @register
@@ -299,9 +321,7 @@ class ToolPose(FrameError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        flange = controller_frames(robot).flange[:3, :3]
-        step = np.concatenate([flange.T @ self.vector()[:3], self.vector()[3:]])
-        moved = frame(step, 'of the flange', 'of the tool')
+        moved = self.in_words(robot)
         return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
 
 
@@ -352,11 +372,8 @@ class RootPose(FrameError):
         return np.asarray(there @ now), np.asarray(there @ new)
 
     def remedy(self, robot: Robot) -> str:
-        rows = robot.T_base_foot
-        step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
-        now, new = self.stands(robot, rows)
-        moved = frame(step, 'of the base', 'of the positioner')
+        now, new = self.stands(robot, robot.T_base_foot)
         return (
-            f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
-            f'stands at {controller_pose(new)} in place of {controller_pose(now)}.'
+            f'Correct the root frame of the positioner by {self.in_words(robot)}: in the base '
+            f'of the robot it stands at {controller_pose(new)} in place of {controller_pose(now)}.'
         )

@@ -236,8 +236,8 @@ class Drift(LinearEffect):
     def remedy(self, robot: Robot) -> str:
         each = numbers(np.asarray(self.xyz_rate) * 3.6e6)
         return (
-            f'Find what creeps (fixture, tripod, pedestal): ({each}) mm per hour along x, y, z; '
-            'measure a fixed point now and then.'
+            f'Find what creeps (fixture, tripod, pedestal): ({each}) mm per hour along x, y, z of the '
+            'measuring frame; measure a fixed point now and then.'
         )
 
 
@@ -320,5 +320,6 @@ class Refraction(LinearEffect):
     def remedy(self, robot: Robot) -> str:
         return (
             'Stir the air along the line of sight, shield it from heat or stand the instrument '
-            f'nearer: the air warms by ({numbers(self.warming)}) K/m along x, y, z and bends it.'
+            f'nearer: the air warms by ({numbers(self.warming)}) K/m along x, y, z of '
+            'the measuring frame and bends it.'
         )

@@ -84,11 +84,6 @@ def _axes(values: Array, least: float, words: str, places: int) -> str:
     return ', '.join(parts)
 
 
-def base_frame(step: Array) -> str:
-    """Return a displacement [m] and a turn [rad] of the base, shape (6,); see `frame`."""
-    return frame(step, 'of the measuring frame', 'of the base')
-
-
 def controller_pose(pose: Array) -> str:
     """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
     place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])

@@ -195,9 +195,12 @@ def test_a_tool_is_corrected_along_the_axes_of_the_controllers_flange(tmp_path):
     robot = arms(tmp_path)[1]
     # A millimetre along x of tool0, as the rows of this arm have it.
     x = robot.controller.flange[:3, 0] * 1e-3
-    moved = effect_from_mapping({'effect': 'tool_pose', 'xyz': x.tolist()})
-    (told,) = actions([moved], robot)
-    assert 'by +1.000 mm along axis x of the flange;' in told
+    slipped, moved = (
+        effect_from_mapping({'effect': name, 'xyz': x.tolist()})
+        for name in ('tool_slip', 'tool_pose')
+    )
+    for told in actions([slipped, moved], robot):
+        assert 'by +1.000 mm along axis x of the flange' in told
     real, _ = corrected(robot, [moved])
     on_flange = np.linalg.inv(robot.controller.flange)
     shift = (on_flange @ (real.T_flange_tool - robot.T_flange_tool))[:3, 3]

@@ -10,6 +10,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Diagnosis, Shrink
 from weld_twin_core.effects import Effect
+from weld_twin_core.effects.geometry import FrameError
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
 DEGREES = 180.0 / pi
@@ -52,6 +53,8 @@ _THREE = 3
 """Digits of a value beside an action: more than a controller or a fitter can use."""
 _SEEN = 2.0
 """Standard errors within which all parts of a vector count as nothing: about 95 %."""
+_SMALL_STEP = 1e-6
+"""Step [m, rad] of a frame by which it is told how errors go over into other axes."""
 _GAP = '\N{NO-BREAK SPACE}'
 
 
@@ -196,6 +199,7 @@ def short_rows(
     """Return the parameters of an effect as `in_short`; of a vector the axes that count."""
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
+    effect, std = _as_told(effect, std, robot)
     out = []
     for p in effect.parameters:
         value: Any = getattr(effect, p.name)
@@ -212,6 +216,22 @@ def short_rows(
             words = in_short(float(value), None if np.ndim(error) else error, factor, unit)
         out += [(p.name, words)] if words else []
     return out
+
+
+def _as_told(
+    effect: Effect, std: dict[str, Any], robot: Robot | None
+) -> tuple[Effect, dict[str, Any]]:
+    """Return the error of a frame in the axes in which its remedy is told; others as they are."""
+    if robot is None or not isinstance(effect, FrameError):
+        return effect, std
+    known = {p.name: std[p.name] for p in effect.parameters if np.ndim(std.get(p.name, 0.0))}
+    errors = np.concatenate([known.get(p.name, np.zeros(3)) for p in effect.parameters])
+    told = [effect.with_vector(row).told(robot) for row in _SMALL_STEP * np.eye(6)]
+    share = np.transpose(told) / _SMALL_STEP
+    # A direction that is not known at all, with an infinite error, counts only where it takes part.
+    parts = np.multiply(share, errors, where=share != 0.0, out=np.zeros((6, 6)))
+    own = dict(zip(('xyz', 'rotvec'), np.linalg.norm(parts, axis=1).reshape(2, 3), strict=True))
+    return effect.with_vector(effect.told(robot)), {name: own[name].tolist() for name in known}
 
 
 def _that_count(value: Any, std: Any, factor: float, unit: str) -> str:
@@ -236,6 +256,7 @@ def parameter_rows(
     """Return name and value of every parameter of an effect; a ripple has a row per order."""
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
+    effect, std = _as_told(effect, std, robot)
     parameters = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
     return [
         (p.name, _shown(p.name, effect.unit(p, robot), getattr(effect, p.name), std.get(p.name)))

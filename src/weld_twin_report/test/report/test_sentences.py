@@ -9,6 +9,7 @@ import diagnoses
 import pytest
 from rich.console import Console
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Candidate, Site, Unexplained
 from weld_twin_core.diagnosis.verdict.decision import UNEVEN
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
@@ -104,6 +105,9 @@ def test_a_vector_is_told_in_one_row():
     tool = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-3, 0, -2e-3]})
     rows = parameter_rows(tool, {'xyz': [1e-5, 1e-5, 1e-5]})
     assert plain(rows[0][1]) == 'x 1.000 ± 0.010, y 0.000 ± 0.010, z -2.000 ± 0.010 mm'
+    # The flange of this robot is turned by half a turn about x at the end of its rows.
+    turned = parameter_rows(tool, {'xyz': [1e-5, 2e-5, 3e-5]}, load('kuka_kr6_r900'))
+    assert plain(turned[0][1]) == 'x 1.000 ± 0.010, y 0.000 ± 0.020, z 2.000 ± 0.030 mm'
     none = effect_from_mapping({'effect': 'tool_pose', 'xyz': [1e-6, 0, -2e-6]})
     assert (
         plain(parameter_rows(none, {'xyz': [1e-5] * 3})[0][1]) == '0.000 ± 0.010 mm in x, y and z'

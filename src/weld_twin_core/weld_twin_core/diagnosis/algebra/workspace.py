@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.plausible import spreads
 from ..beliefs import Beliefs
 from .columns import Columns, designed
 from .definite import Index, unit_diagonal
@@ -197,6 +198,18 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
     return np.asarray(-(count * np.log(remaining) + freedom * np.log(count)) / 2.0)
 
 
+def sized(result: Fit) -> float:
+    """
+    Return the log probability of the sizes of a fit's effects, against that of none.
+
+    Cauchy's distribution about zero with the spread that machines have: most have little, and a few
+    have a fault of ten times that.
+    """
+    robot = result.model.robot
+    each = (effect.fit.coordinates() / spreads(robot, effect) for effect in result.model.found)
+    return -float(sum(np.log1p(size**2).sum() for size in each))
+
+
 @dataclass(frozen=True, eq=False)
 class Choice:
     """A unit with the seed and columns that serve it best."""
@@ -362,7 +375,8 @@ class Workspace:
 
         more = float(own.coordinates.size - now.coordinates.size)
         count = self.independent((now, own))
-        return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
+        lead = evidence(now.rss, now.rss - own.rss, more, count) + sized(own) - sized(now)
+        return lead - cost(own) + cost(now)
 
     def hopeless(self, now: Fit) -> float:
         """Return the sum of squares from which on nothing can take the place of what was found."""

@@ -20,7 +20,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
-from ..algebra.workspace import Choice, Part, Role, Workspace, evidence
+from ..algebra.workspace import Choice, Part, Role, Workspace, evidence, sized
 from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
@@ -52,7 +52,8 @@ def fit_alternatives(
             # Unused components of a vector effect buy nothing and cost nothing.
             freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
             trials = max(choice.unit.trials, 1.0)
-        return evidence(rest.rss, rest.rss - full.rss, freedom, count) - float(np.log(trials))
+        size = sized(full) - sized(rest) - float(np.log(trials))
+        return evidence(rest.rss, rest.rss - full.rss, freedom, count) + size
 
     out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:

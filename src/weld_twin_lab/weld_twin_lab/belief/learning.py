@@ -101,7 +101,7 @@ TERMS: dict[str, dict[str, int]] = {
         'wander': 0,
     },
     # A set with more names is likelier to hold the right one.
-    'name of many': {**MANY, 'members': 1},
+    'name of many': {**MANY, 'low growth': 1, 'members': 1},
     'place of many': MANY,
     'dependence of many': MANY,
     'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},

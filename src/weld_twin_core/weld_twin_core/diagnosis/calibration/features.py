@@ -28,6 +28,9 @@ MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
 REGULAR = -2.0
 """Decimal logarithm of the share of what is left from which on it counts as regular."""
+LOW_GROWTH = 0.12
+"""Growth of the error without a kind, as `log1`, below which it is hardly missed: by a third, between
+the tenth from which on it is needed and the two thirds that most are missed by."""
 WIDEST = 3
 """Members of a set of names up to which it still says what to do; a wider one is held to more."""
 ONLY = 'only '
@@ -199,6 +202,8 @@ def of_kind(family: Family, names: int, kinds: int, floor: float, left: float) -
     return plain(
         {
             'growth': log1(family.growth),
+            # What is hardly missed says more than how much others are.
+            'low growth': min(log1(family.growth), LOW_GROWTH),
             'least growth': log1(min(family.growths, default=0.0)),
             'size': log(family.rms_m / floor),
             'size over left': log(family.rms_m / left),

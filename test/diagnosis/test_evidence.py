@@ -7,10 +7,19 @@ from itertools import accumulate
 import numpy as np
 import pytest
 from diagnosis_cells import effect
-from scipy.stats import norm
+from scipy.stats import cauchy, norm
 
+import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
-from weld_twin_core.diagnosis.algebra.workspace import SeedSystems, Unit, evidence, ranking
+from weld_twin_core.diagnosis.algebra.fit import Fit
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.algebra.workspace import (
+    SeedSystems,
+    Unit,
+    evidence,
+    ranking,
+    sized,
+)
 from weld_twin_core.diagnosis.result import Site
 
 
@@ -56,6 +65,15 @@ def test_evidence_is_the_ratio_of_likelihoods_less_half_a_log_per_parameter():
 def test_fewer_independent_rows_make_the_same_fall_worth_less():
     worth = [evidence(100.0, 20.0, 1.0, n) for n in (1000.0, 300.0, 100.0)]
     assert worth[0] > worth[1] > worth[2] > 0.0
+
+
+def test_a_size_counts_as_often_as_machines_have_it():
+    robot = wt.load('ur5')
+    large = wt.effects.JointOffset('elbow_joint', offset=0.02)  # four times the usual 5 mrad
+    small = wt.effects.LinkLength('wrist_1_joint', da=1e-4)  # a fifth of the usual 0.5 mm
+    model = Model(robot, (np.eye(4),), found=(large, small))
+    expected = cauchy.logpdf([4.0, 0.2]) - cauchy.logpdf(0.0)
+    assert sized(Fit(model, np.zeros(0))) == pytest.approx(expected.sum())
 
 
 def test_a_column_of_noise_is_rarely_worth_its_freedom():

@@ -231,7 +231,7 @@ def _along(unseen: Unseen, moved: Array) -> Array:
     """Return how far each effect moves the tool along with all of them, (_DRAWS, K) [m^2]."""
     count, first = len(unseen.parts), unseen.frames
     own_columns = unseen.columns.chosen(np.arange(first, unseen.columns.count)).written_out()
-    rows = (*unseen.targets[1:], *own_columns)
+    rows = unseen.beside_frames(np.concatenate([unseen.targets[1:], own_columns]))
     each = np.array([_positions(unseen.problem, unseen.scale, row) for row in rows])
     products = each @ each.T
     together = np.hstack([np.ones((len(moved), count)), moved]) @ products

@@ -52,7 +52,9 @@ def fit_alternatives(
             # Unused components of a vector effect buy nothing and cost nothing.
             freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
             trials = max(choice.unit.trials, 1.0)
-        size = sized(full) - sized(rest) - float(np.log(trials))
+        # What may only stand beside what was found does so as the same on these data, however large.
+        own = full if choice is None or choice.unit.role is Role.FOUND else now
+        size = sized(own) - sized(rest) - float(np.log(trials))
         return evidence(rest.rss, rest.rss - full.rss, freedom, count) + size
 
     out = [Alternative(place, log_bayes(now, own), now)]

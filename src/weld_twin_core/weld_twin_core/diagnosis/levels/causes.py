@@ -271,11 +271,10 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[Cause]:
 
 def _contributions(unseen: Unseen) -> Array:
     """Return how much each effect moves the tool along with all of them, (K, samples) [m^2]."""
-    total = unseen.targets[1:].sum(axis=0) if len(unseen.parts) else np.zeros(0)
+    fields = unseen.beside_frames(unseen.targets[1:])
+    total = fields.sum(axis=0)
     # A product of two fields is a difference of two squares.
-    return np.array(
-        [(unseen.squares(total + t) - unseen.squares(total - t)) / 4 for t in unseen.targets[1:]]
-    )
+    return np.array([(unseen.squares(total + f) - unseen.squares(total - f)) / 4 for f in fields])
 
 
 def _shares(
@@ -317,13 +316,7 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     """
     if not any(cause.members for cause in causes):
         return None
-    # What each effect adds once the frames are fitted anew.
-    fields, count = unseen.targets[1:], unseen.frames
-    if count:
-        columns = unseen.columns.chosen(np.arange(count)).written_out()
-        normal = columns @ columns.T + np.diag(unseen.precision[:count])
-        step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
-        fields = fields - step.T @ columns
+    fields = unseen.beside_frames(unseen.targets[1:])
     named = {k for cause in causes for k in cause.members}
     others = tuple(k for k in range(len(fields)) if k not in named)
     groups = [cause.members for cause in causes] + [others] * bool(others)

@@ -156,6 +156,15 @@ class Unseen:
     def frames(self) -> int:
         return int(self.parts[0].start if self.parts else self.columns.count)
 
+    def beside_frames(self, fields: Array) -> Array:
+        """Return what fields of the tool, (K, rows), leave once the frames are fitted to them, too."""
+        if not self.frames:
+            return fields
+        columns = self.columns.chosen(np.arange(self.frames)).written_out()
+        normal = columns @ columns.T + np.diag(self.precision[: self.frames])
+        step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
+        return np.asarray(fields - step.T @ columns)
+
     def predict(self, kept: Sequence[int]) -> Array:
         """Return the residual on every stretch of the model fitted on the others, (rows,)."""
         if self.columns.count <= MANY:

@@ -10,8 +10,8 @@ from diagnosis_cells import effect
 from scipy.stats import cauchy, norm
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
 from weld_twin_core.diagnosis.algebra.fit import Fit
+from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.algebra.workspace import (
     SeedSystems,

@@ -18,6 +18,8 @@ from .cubics import hermite
 from .errors import DataError
 from .pose_noise import Common, PoseNoise, inverse_error
 
+FIRST_DATE_NS = 10**18
+"""Stamps [ns] before 2001 count from something else than 1970."""
 _WRENCH_FRAMES = ('tool', 'base')
 
 
@@ -406,6 +408,11 @@ class Recording:
     ) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         wrench, warm, effort = (None if side is None else side.at(t) for side in self.sides)
         return (*self.joints.at(t), wrench, warm, effort)
+
+    @property
+    def dated(self) -> bool:
+        """Return whether its stamps count from a date: those of a simulation, say, do not."""
+        return self.epoch_ns >= FIRST_DATE_NS
 
     @property
     def span_ns(self) -> tuple[int, int]:

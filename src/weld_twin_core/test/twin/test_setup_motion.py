@@ -7,7 +7,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import effect_from_mapping
-from weld_twin_core.effects.dated import of_the_robot, seen_from
+from weld_twin_core.effects.dated import in_use, of_the_robot, seen_from
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
 
@@ -49,3 +49,28 @@ def test_another_day_sees_the_arm_alone(first):
     whole, other = stations(0, 100), stations(first, 20)
     carried = seen_from(EFFECTS, whole.epoch_ns, whole.span_ns, other)
     assert carried == of_the_robot(EFFECTS) == EFFECTS[:1]
+
+
+DATE = 1_700_000_000
+
+
+@pytest.mark.parametrize(
+    ('epoch', 'first', 'same', 'slipped', 'told'),
+    [
+        # Tables and simulated time: both begin near zero, and one began after the other all the same.
+        (0, 0, False, 20 * [True], 'recorded after that, for stamps without a date'),
+        (0, 0, True, 10 * [False] + 10 * [True], ''),
+        (DATE, DATE + 3, False, 7 * [False] + 13 * [True], ''),
+        (DATE, DATE + 5000, False, 20 * [True], 'recorded after that.'),
+        (DATE, DATE - 5000, False, 20 * [False], 'recorded before that.'),
+        (DATE, 0, False, 20 * [True], 'recorded after that, for stamps without a date'),
+    ],
+)
+def test_a_tool_that_slipped_stays_slipped(epoch, first, same, slipped, told):
+    slip = effect_from_mapping({'effect': 'tool_slip', 'xyz': [1e-3, 0.0, 0.0], 'time': 10.0})
+    other = stations(first - 1000, 20)
+    span = tuple(epoch * SECOND + end * SECOND for end in (0, 100))
+    carried, said = in_use([slip], epoch * SECOND, span, other, same=same)
+    moved = np.linalg.norm(positions(carried, other) - positions((), other), axis=1)
+    np.testing.assert_array_equal(moved > 5e-4, slipped)
+    assert [told in sentence for sentence in said] == ([True] if told else [])

@@ -18,7 +18,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from ..recording import Recording
+from ..recording import FIRST_DATE_NS, Recording
 from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
 from .geometry import ChannelError, FrameError, JointOffset, frame_parameters
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
@@ -272,7 +272,7 @@ def left_behind(effects: Sequence[Effect]) -> list[str]:
     """Return which causes `of_the_robot` leaves with the set-up that had them, in sentences."""
     return [
         f'{effect.traits.title} at t = {effect.time:.4g} s stays with the set-up that was recorded: '
-        f'the {effect.channel} is taken as it was before that.'
+        f'the {effect.channel} is taken as it was before that, so mend it first.'
         for effect in effects
         if isinstance(effect, _SuddenFrame)
     ]
@@ -290,5 +290,44 @@ def seen_from(
     first, last = other.span_ns
     if last < span_ns[0] or first > span_ns[1]:
         return of_the_robot(effects)
-    later = (other.epoch_ns - epoch_ns) * 1e-9
+    return _recounted(effects, (other.epoch_ns - epoch_ns) * 1e-9)
+
+
+def in_use(
+    effects: Sequence[Effect],
+    epoch_ns: int,
+    span_ns: tuple[int, int],
+    other: Recording,
+    *,
+    same: bool,
+) -> tuple[tuple[Effect, ...], list[str]]:
+    """
+    Return effects as they act in another recording of the same cell, and what to say of that.
+
+    What slipped stays slipped until somebody mends it. Where nothing tells when one of both was
+    recorded, the other is taken to have been begun as the one diagnosed ended.
+
+    epoch_ns, span_ns: see `seen_from`.
+    same: the other is the one diagnosed, so that their stamps count from the same instant.
+    """
+    known = same or (other.dated and epoch_ns >= FIRST_DATE_NS)
+    first, last = other.span_ns
+    if not known:
+        begun = (span_ns[1] - epoch_ns) * 1e-9 - float(other.joints.t[0])
+        why = ', for stamps without a date do not tell when; give both the date and time'
+    elif last < span_ns[0] or first > span_ns[1]:
+        begun, why = (other.epoch_ns - epoch_ns) * 1e-9, ''
+    else:
+        return _recounted(effects, (other.epoch_ns - epoch_ns) * 1e-9), []
+    after = not known or first > span_ns[1]
+    return _recounted([e for e in effects if not isinstance(e, _SetupMotion)], begun), [
+        f'{effect.traits.title} at t = {effect.time:.4g} s of the recording diagnosed: '
+        f'{other.name} is taken as recorded {"after" if after else "before"} that{why}.'
+        for effect in effects
+        if isinstance(effect, Sudden)
+    ]
+
+
+def _recounted(effects: Sequence[Effect], later: float) -> tuple[Effect, ...]:
+    """Return effects whose instants count from an epoch that is later by so much [s]."""
     return tuple(e.recounted(later) if isinstance(e, _Timed) else e for e in effects)

@@ -15,7 +15,7 @@ from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
-from weld_twin_core.effects.dated import of_the_robot, seen_from
+from weld_twin_core.effects.dated import in_use, left_behind, of_the_robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Counted, Recording
 from weld_twin_core.twin.twin import Twin
@@ -228,20 +228,23 @@ def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
     return model.twin(setup)
 
 
-def timed(path: Path | str, model: Model, setup: int, recording: Recording) -> Twin:
+def timed(
+    path: Path | str, model: Model, setup: int, recording: Recording, *, same: bool
+) -> tuple[Twin, list[str]]:
     """
-    Return the twin of one set-up of a diagnosis file, for a recording at its time.
+    Return the twin of one set-up of a diagnosis file for a recording at its time, and what to say.
 
-    How the set-up itself moved is applied where the recording overlaps with the one diagnosed.
+    same: the recording is the one diagnosed of that set-up; see `in_use`.
     """
     stored = read_diagnosis(path)['model']
     twin = model.twin(setup)
     try:
         epoch, span = int(stored['epochs_ns'][setup]), stored['spans_ns'][setup]
-        effects = seen_from(twin.effects, epoch, (int(span[0]), int(span[1])), recording)
+        ends = int(span[0]), int(span[1])
+        effects, said = in_use(twin.effects, epoch, ends, recording, same=same)
     except (KeyError, IndexError, TypeError, ValueError):
-        effects = of_the_robot(twin.effects)
-    return Twin(twin.robot, effects)
+        effects, said = of_the_robot(twin.effects), left_behind(twin.effects)
+    return Twin(twin.robot, effects), said
 
 
 def one_base(model: Model) -> bool:

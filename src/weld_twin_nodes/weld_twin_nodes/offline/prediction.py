@@ -70,7 +70,7 @@ class Predictor(NamedTuple):
     source: Recording | None = None
     """The recording that it is for, mended as the diagnosis mended its own; None where nothing had
     to be."""
-    remark: str = ''  # what is to be said of that, and of what stays with the set-up recorded
+    remark: str = ''  # what is to be said of that, and of when it was recorded
 
     def expected(self, recording: Recording) -> tuple[Poses, Array] | None:
         """Return where all models allowed have the tool at every joint state, and how sure that is."""
@@ -128,10 +128,9 @@ def predictor(
     # Clocks are apart by another time in every run. Where something was measured, that tells.
     clocks = place if place is not None else -1 if recording.measured is None else chosen
     source, notes = mended_source(model, robot, recording, clocks)
-    twin = timed(path, model, chosen, source)
-    if len(twin.effects) < len(model.twin(chosen).effects):
-        notes = ' '.join([notes, *left_behind(model.found)]).strip()
-    return Predictor(twin, read_posterior(robot, path), chosen, source, notes)
+    twin, said = timed(path, model, chosen, source, same=place == chosen)
+    remark = ' '.join([notes, *said]).strip()
+    return Predictor(twin, read_posterior(robot, path), chosen, source, remark)
 
 
 def on_one_clock(recording: Recording) -> Recording:
@@ -225,7 +224,7 @@ class Compensated(NamedTuple):
     motion: JointMotion  # the new commands, counted as the nominal ones came
     remark: str = ''
     """That the commands were read as the diagnosis mended its recordings, and are written as they
-    came; empty where they are not."""
+    came, and what stays with the set-up that was recorded; empty where there is neither."""
 
 
 def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
@@ -237,6 +236,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     if stored is not None:
         # Its clocks are its own, and commands need none.
         recording, notes = mended_source(stored, robot, given, -1)
+        notes = ' '.join([notes, *left_behind(stored.known + stored.found)]).strip()
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     share = None
     if model.posterior is not None:

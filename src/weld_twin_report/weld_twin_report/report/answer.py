@@ -72,8 +72,6 @@ FAMILY_HEADS = ('Kind', 'Accounts for', 'Error without it', 'Needed at', 'Would 
 RIPPLE_HEADS = ('Joint', 'Ripple, RMS', 'Strongest orders per turn')
 
 
-_FIRST_REAL_STAMP = 10**18
-"""Stamps [ns] before 2001 count from something else than the epoch."""
 _WIDER = 2.0
 """Ratio of the error elsewhere in the reach to that where it was measured from which it is a warning."""
 _ALIKE = 1.5
@@ -266,7 +264,7 @@ class Answer:
 
 def recorded_at(recordings: Sequence[Recording]) -> str:
     """Return when the first of the recordings was made; nothing where the stamps do not tell."""
-    stamps = [r.epoch_ns for r in recordings if r.epoch_ns > _FIRST_REAL_STAMP]
+    stamps = [r.epoch_ns for r in recordings if r.dated]
     if not stamps:
         return ''
     when = datetime.fromtimestamp(min(stamps) * 1e-9, tz=timezone.utc)

@@ -144,6 +144,7 @@ def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content) + changed_robot(content, given.robot)
+    entry['notes'] += correcting.left_to_mend(robot, given.model)
     if given.tolerance:
         tolerance = _length(given.tolerance, '--tolerance')
         noise = _length(given.noise or NOISE, '--noise')

@@ -241,8 +241,10 @@ def _scale(parts: list[Array]) -> Scale:
 
 def _of_strays(residual: Array) -> Array:
     """Return the weight of every sample (M, c) beside the size of most, (M,)."""
-    off = np.maximum(np.linalg.norm(residual, axis=1), TINY)
-    return np.asarray(np.minimum(1.0, (HUBER * np.median(off) / off) ** 2))
+    off = np.linalg.norm(residual, axis=1)
+    # Points have empty rows where poses have turns.
+    usual = np.median(off[off > TINY]) if (off > TINY).any() else TINY
+    return np.asarray(np.minimum(1.0, (HUBER * usual / np.maximum(off, TINY)) ** 2))
 
 
 def _whitened(problem: Problem, parts: Sequence[Array], scale: Scale) -> Array:

@@ -14,7 +14,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.motion.inverse.along_path import PathSolution
+from weld_twin_core.motion.inverse.along_path import ILL_CONDITIONED, PathSolution
 from weld_twin_core.motion.paths import KINDS
 from weld_twin_core.motion.planned_motion import Plan as SeamPlan
 from weld_twin_core.motion.programs import travel
@@ -33,8 +33,6 @@ SLOW = (0.1, 0.05)
 """Of the first run: share of the joints' speeds, and speed of the tool [m/s]."""
 FAST = (EASY, 0.25)
 """The most of any run: share of the joints' speeds, and 250 mm/s, the reduced speed of ISO 10218."""
-SINGULAR = 200.0
-"""Condition number of the Jacobian from which a place is near a singularity."""
 BACK = 2e-4
 """A program that is read again may be this far off [rad or m]: FANUC writes thousandths of degrees."""
 RATE = 50.0
@@ -242,7 +240,7 @@ def _singular(robot: Robot, q: Array) -> list[str]:
     )
     fine = np.concatenate([between, q[-1:]])
     condition = PathSolution(robot, np.zeros((0, 4, 4)), fine, '').condition
-    near = np.flatnonzero(condition > SINGULAR)
+    near = np.flatnonzero(condition > ILL_CONDITIONED)
     if not near.size:
         return []
     at = int(near[0]) // 8 + 1

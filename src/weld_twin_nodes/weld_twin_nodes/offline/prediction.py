@@ -18,6 +18,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.dated import left_behind
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
+from weld_twin_core.motion.inverse.along_path import ILL_CONDITIONED, PathSolution
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import Compensation, beyond_limits, compensate
 from weld_twin_core.twin.domain import as_seen
@@ -45,9 +46,11 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from .given_twin import build_twin, diagnosis_of
 
 BESIDE = 'prediction.json'
-"""Beside the bag: the stretches outside what was recorded."""
+"""Beside the bag: the stretches outside what was recorded, and where a correction falls short."""
 
 
+_ROUNDED = 5e-8
+"""Length [m] that is 0.0000 mm."""
 MOST = 3
 """Segments listed on the terminal; the others are in the file."""
 
@@ -58,6 +61,15 @@ class Segment(NamedTuple):
     t_start: float
     t_end: float
     why: str
+
+
+class Farthest(NamedTuple):
+    """Where the tool stays farthest off by the model [s from the first stamp], and why."""
+
+    t: float
+    before_m: float
+    after_m: float
+    why: str  # empty where nothing is known to stand in the way
 
 
 class Predictor(NamedTuple):
@@ -181,12 +193,16 @@ def _deviation(twin: Twin, recording: Recording) -> Array | None:
     return np.asarray(gap @ twin.robot.T_world_origin[:3, :3])
 
 
-def beside_bag(model: Predictor, outside: Sequence[Segment]) -> dict[str, str]:
-    """Return what lies in the bag's directory: the stretches outside what was recorded."""
-    if model.posterior is None:
-        return {}
-    content = {'outside': [segment._asdict() for segment in outside]}
-    return {BESIDE: json.dumps(content, indent=1) + '\n'}
+def beside_bag(
+    model: Predictor, outside: Sequence[Segment], worst: Farthest | None = None
+) -> dict[str, str]:
+    """Return what lies in the bag's directory: stretches outside what was recorded, the worst place."""
+    content: dict[str, Any] = {}
+    if model.posterior is not None:
+        content['outside'] = [segment._asdict() for segment in outside]
+    if worst is not None:
+        content['farthest'] = worst._asdict()
+    return {BESIDE: json.dumps(content, indent=1) + '\n'} if content else {}
 
 
 def sureness_sentences(model: Predictor, got: Written) -> list[str]:
@@ -275,7 +291,31 @@ def write_compensated(
         expected=made.model.expected(commands),
         storage=storage,
         provenance={COMPENSATED: [effect.to_mapping() for effect in twin.effects]},
-        beside=beside_bag(made.model, made.outside),
+        beside=beside_bag(made.model, made.outside, farthest(made, recording)),
+    )
+
+
+def farthest(made: Compensated, recording: Recording) -> Farthest:
+    """Return where corrected commands leave the tool farthest from where it is wanted."""
+    before, after = (
+        np.linalg.norm(off[:, :3], axis=1) for off in (made.result.before, made.result.after)
+    )
+    at, t = int(after.argmax()), recording.joints.t
+    there = made.result.motion.q[at : at + 1]
+    posture = PathSolution(made.model.twin.robot, np.zeros((0, 4, 4)), there, '')
+    near = after[at] > _ROUNDED and posture.condition[0] > ILL_CONDITIONED
+    why = 'near a singularity the joints cannot make all of the correction' if near else ''
+    return Farthest(float(t[at] - t[0]), float(before[at]), float(after[at]), why)
+
+
+def farthest_sentence(made: Compensated, recording: Recording) -> str:
+    """Return how far off the tool stays at its worst, and why; empty where it is off nowhere."""
+    worst = farthest(made, recording)
+    if worst.after_m <= _ROUNDED:
+        return ''
+    return (
+        f'farthest off it stays at {worst.t:.2f} s from the first stamp, {worst.after_m * 1e3:.4f} mm '
+        f'and {worst.before_m * 1e3:.4f} mm before{"; " * bool(worst.why)}{worst.why}'
     )
 
 

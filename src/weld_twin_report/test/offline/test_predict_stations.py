@@ -14,7 +14,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.compensation import compensate
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import BagReader
+from weld_twin_nodes.offline.prediction import Compensated, Predictor, farthest_sentence
 
 ARM = catalog.load('kuka_kr6_r900')
 RNG = np.random.default_rng(77)
@@ -109,3 +114,16 @@ def test_a_temperature_that_the_bag_lacks_is_said(tmp_path):
     flange = forward(ARM.with_frames(tool=np.eye(4)), Q[:6])[:, :3, 3]
     moved = predicted(tmp_path / 'warm') - forward(ARM, Q[:6])[:, :3, 3]
     np.testing.assert_allclose(moved, 1.2e-4 * flange, atol=2e-6)
+
+
+@pytest.mark.parametrize(('wrist', 'near'), [(1e-4, True), (0.9, False)])
+def test_a_station_that_cannot_be_corrected_near_a_singularity_is_told(wrist, near):
+    q = Q[:5].copy()
+    q[3, 4] = wrist
+    stations = Recording('stations', JointMotion(STEP * np.arange(5.0), q, static=True))
+    twist = effect_from_mapping({'effect': 'link_twist', 'joint': 'joint_a6', 'dalpha': 2e-3})
+    result = compensate(ARM, [twist], stations)
+    made = Compensated(result, Predictor(Twin(ARM)), [], 1.0, result.motion)
+    told = farthest_sentence(made, stations)
+    assert ('at 12.00 s' in told and 'near a singularity' in told) == near
+    assert near or not told

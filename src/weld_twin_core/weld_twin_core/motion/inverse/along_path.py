@@ -26,6 +26,8 @@ _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
 _TRACKED = 6
 """Postures at the first sample that are followed along the path."""
+ILL_CONDITIONED = 200.0
+"""Condition number of the Jacobian from which a place is near a singularity."""
 _SINGULAR = 1e-8
 """Determinant of the Jacobian below which a closed form loses digits."""
 _NUDGE = 1e-3

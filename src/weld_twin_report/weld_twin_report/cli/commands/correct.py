@@ -99,6 +99,8 @@ def _corrected_bag(given: Given) -> int:
         'this is what the effects in the model do on these commands; the gap of a diagnosis also '
         'holds noise and whatever it left unexplained'
     )
+    if worst := prediction.farthest_sentence(made, recording):
+        print(worst)
     for sentence in prediction.trust_sentences(made):
         print(sentence)
     if leap := prediction.leap_sentence(robot, made, recording):

@@ -24,7 +24,7 @@ def test_what_gains_most_comes_first_with_what_is_then_left():
     assert play.then_m == pytest.approx(3.10483e-3, rel=1e-5)
     assert play.gain_m == pytest.approx(1.89517e-3, rel=1e-5)
     assert play.instruction == 'preload or renew the gear of elbow_joint'
-    assert base.instruction == 'square up the base about its y axis'
+    assert base.instruction == 'square up the base about the y axis of the measuring frame'
     assert (base.now, base.wanted) == ('0.057° (1 mrad)', '0.011° (0.2 mrad)')
 
 

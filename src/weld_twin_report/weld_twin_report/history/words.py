@@ -121,7 +121,12 @@ def coordinate(name: str) -> Coordinate:
     if name.startswith(_TOOL):
         axis = name.removeprefix(_TOOL)
         factor, unit = display_unit(axis, 'rad' if axis.startswith('turn') else 'm')
-        words = f'turn of the tool about {axis[-1]}' if 'turn' in axis else f'tool along {axis}'
+        # A cell keeps no frames of its controller; the tool's own axes turn about themselves.
+        words = (
+            f'turn of the tool about {axis[-1]}'
+            if 'turn' in axis
+            else f"tool along {axis} of the model's flange"
+        )
         return Coordinate('tool_pose', None, words, factor, unit)
     effect, *joint, number = name.split(' ')
     kind = REGISTRY.get(effect)

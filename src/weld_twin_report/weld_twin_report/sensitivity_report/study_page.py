@@ -33,10 +33,13 @@ _DO = {
     'payload': 'weigh the tool and enter it',
 }
 _FRAMES = {
-    ('base_pose', 'rotvec'): 'square up the base about its {axis} axis',
-    ('base_pose', 'xyz'): 'survey the base along its {axis} axis',
+    ('base_pose', 'rotvec'): 'square up the base about the {axis} axis of the measuring frame',
+    ('base_pose', 'xyz'): 'survey the base along the {axis} axis of the measuring frame',
     ('tool_pose', 'rotvec'): 'square up the tool about its {axis} axis',
-    ('tool_pose', 'xyz'): 'measure the tool centre point along its {axis} axis',
+    (
+        'tool_pose',
+        'xyz',
+    ): "measure the tool centre point along the {axis} axis of the model's flange",
 }
 
 

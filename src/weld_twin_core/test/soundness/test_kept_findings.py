@@ -53,6 +53,10 @@ class Cell:
         return self.rests(robot=self.elsewhere())
 
     @cached_property
+    def few(self):
+        return self.seen(stations(UR5, self.rng, 60), robot=self.elsewhere(), points=True)
+
+    @cached_property
     def own(self):
         return self.moves()
 
@@ -60,6 +64,12 @@ class Cell:
     def run(self):
         real = self.elsewhere(tool=0.0)
         return self.seen(moving(UR5, self.rng), real, points=True)
+
+
+def one_off(cell, reading):
+    seen = cell.few.measured
+    first = cell.few.with_measured(seen.take(np.arange(len(reading))))
+    return remeasured(first, position=seen.position[reading])
 
 
 def joints(recording, change):
@@ -233,6 +243,10 @@ KINDS = {
         c.own, lambda q: q - QUARTER), NONE),
     'a base axis onto axis': ('base_turned', lambda c: points(c.own, lambda p: p @ BACK.T), NONE),
     'rows mixed up': ('other', lambda c: joints(c.placed, lambda q: q[c.rng.permutation(len(q))])),
+    'a reading missed': ('other', lambda c: one_off(c, np.delete(np.arange(60), 25))),
+    'a reading doubled': ('other', lambda c: one_off(c, np.insert(np.arange(60), 40, 40)[:-1])),
+    'the last stations mixed up': ('other', lambda c: points(
+        c.few, lambda p: np.r_[p[:35], p[35:][c.rng.permutation(len(p) - 35)]])),
     'orientations inverted': ('other', lambda c: turns(c.placed, lambda r: np.swapaxes(r, -1, -2))),
     'quaternions w first': ('other', lambda c: turns(
         c.placed, lambda r: matrix_from_quaternion(np.roll(quaternion_from_matrix(r), 1, axis=-1)))),

@@ -25,6 +25,7 @@ MADE = {
     'velocities': {'k': 0},
     'poses_inverted': {},
     'even_stamps': {'k': 0, 'first': 0.1, 'step': 0.02, 'lost': (5, 9), 'count': 100},
+    'rows': {'k': 0, 'reading': [0, 2, 4], 'station': np.array([1, 2, 5]), 'count': 1200},
     'may_change': {'families': ('tool_pose',)},
 }
 

@@ -422,8 +422,10 @@ def clock(sound: Sound, rng: np.random.Generator) -> Made:
 
 
 def other(sound: Sound, rng: np.random.Generator) -> Made:
-    """Pair measurements with the wrong rows or motion, or write quaternions in another order."""
+    """Pair measurements with the wrong rows or motion, miss or double one, or invert orientations."""
     seen = _seen(sound.recording)
+    if sound.recording.joints.static and rng.random() < 0.5:
+        return _one_off(sound, rng)
     if seen.rotation is not None and rng.random() < 0.5:
         return _measured(sound, 'orientations inverted', rotation=seen.rotation.swapaxes(1, 2))
     if sound.recording.joints.static:
@@ -432,6 +434,20 @@ def other(sound: Sound, rng: np.random.Generator) -> Made:
     else:  # shifted in time it would be another clock
         position, said = seen.position[::-1], 'measured on the way back'
     return _measured(sound, said, position=position, rotation=None)
+
+
+def _one_off(sound: Sound, rng: np.random.Generator) -> Made:
+    """Miss a reading, or take it twice, so that all that follow are a row off."""
+    seen = _seen(sound.recording)
+    each, row = np.arange(seen.t.size), int(seen.t.size * rng.uniform(0.1, 0.8))
+    missed = bool(rng.random() < 0.5)
+    reading = np.delete(each, row) if missed else np.insert(each, row, row)[:-1]
+    rotation = None if seen.rotation is None else seen.rotation[reading]
+    taken = replace(
+        seen.take(each[: reading.size]), position=seen.position[reading], rotation=rotation
+    )
+    said = f'reading {row + 1} {"missed" if missed else "doubled"}'
+    return sound.robot, sound.recording.with_measured(taken), said
 
 
 def computed(sound: Sound, rng: np.random.Generator) -> Made:

@@ -31,6 +31,7 @@ from .limits import FEW, MOST
 from .mending import Given, as_entry
 from .mixups import mixups
 from .richness import motion, outliers, quantity, repeats
+from .rows import rows
 from .set_up import gravity, orientation, parted, setup
 from .slips import Slip
 from .stamps import clocks, stamps, streams, velocities_checked
@@ -42,6 +43,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'readings': (stuck, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
     'images': (images, 'No camera measured.'),
+    'rows': (rows, 'Each measurement belongs to the station that it stands beside.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'efforts': (efforts, 'No measured effort of the joints is used.'),

@@ -196,6 +196,29 @@ def stamped_evenly(
     return _seen_as(given, stamped, only=k)
 
 
+def repaired(
+    given: Given,
+    k: int,
+    reading: Sequence[int] | NDArray[np.int_],
+    station: Sequence[int] | NDArray[np.int_],
+    count: int,
+) -> Given:
+    """
+    Return what was given with readings of recording k beside the stations where they were taken.
+
+    reading, station: rows, in order, of each reading and of its station; other readings are left out.
+    count: how many readings that recording had; one with another number is left as it is.
+    """
+
+    def put(seen: Measurements) -> Measurements:
+        if seen.t.size != count:
+            return seen
+        own = np.asarray(reading, dtype=int)
+        return replace(seen.take(own), t=seen.t[np.asarray(station, dtype=int)])
+
+    return _seen_as(given, put, only=k)
+
+
 def velocities_left_out(given: Given, k: int) -> Given:
     return _with(given, lambda own: replace(own, joints=replace(own.joints, qd=None)), k)
 
@@ -210,6 +233,7 @@ MENDS: dict[str, Callable[..., Given]] = {
     'base': base_turned,
     'stamps': stamps_as,
     'even_stamps': stamped_evenly,
+    'rows': repaired,
     'may_change': differing,
     'velocities': velocities_left_out,
 }

@@ -30,10 +30,10 @@ from ...effects.geometry import (
 )
 from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
-from .lengths import capital, falls, length, listed
+from .lengths import capital, distance, falls, length, listed
 from .limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .mending import frames_fitted
-from .snapshot import LENGTHS, Arm, Snapshot, of_joints, rough_models
+from .snapshot import KINDS, LENGTHS, Arm, Snapshot, of_joints, rough_models
 from .suspicions import doubles, robots, suspicions, turned_bases
 
 GIVE_ITS_MODEL = (
@@ -44,8 +44,9 @@ GIVE_ITS_MODEL = (
 
 def mixups(case: Case) -> Sequence[Finding]:
     """Return what a gap comes from that no plausible arm leaves, if not from the arm."""
+    torn = _far(case.residuals) > UNEXPLAINED
     if case.gap < LARGE:
-        return ()
+        return _torn(case) if torn else ()
     shot = case.snapshot
     arm = shot.arm
     if arm.off > 1.0 and (result := _unravelled(shot, arm)):
@@ -53,9 +54,37 @@ def mixups(case: Case) -> Sequence[Finding]:
         return [_finding(each, shot, after) for each in result]
     if arm.bent > 1.0 and (other := _beyond(case, shot, arm)):
         return other
-    return (_frames(shot) if arm.displaced > 1.0 else ()) or (
-        _links(case, shot, arm) if arm.bent <= 1.0 else ()
+    return (
+        (_frames(shot) if arm.displaced > 1.0 else ())
+        or (_links(case, shot, arm) if arm.bent <= 1.0 else ())
+        or (_torn(case) if torn else ())
     )
+
+
+def _far(parts: Sequence[Array]) -> float:
+    """Return how far off samples are [m], but for the few that may be anything."""
+    return float(np.quantile(np.concatenate([distance(part) for part in parts]), 1.0 - FEW))
+
+
+def _torn(case: Case) -> Sequence[Finding]:
+    """Return that an arm fits most samples, and leaves of many others what no arm does."""
+    shot = case.snapshot
+    remaining = shot.problem.residuals(shot.arm.model)
+    if _far(remaining) < UNEXPLAINED:
+        return ()
+    slips = tuple(slip.effect for slip in case.slips)
+    if slips:  # what gave way is told as that, if it is all that is wrong
+        errors = (*of_joints(shot.robot, KINDS), *slips)
+        if _far(shot.problem.residuals(shot.bent(errors, WIDER))) < UNEXPLAINED:
+            return ()
+    off = np.concatenate([distance(part) for part in remaining])
+    far = off > UNEXPLAINED
+    words = (
+        f'A plausible arm fits most of the measurements, and {far.mean():.0%} of them are off by '
+        f'{length(float(np.median(off[far])))} (median), more than any arm is.'
+    )
+    remedy = 'Check that measurements and joint positions of one row belong together'
+    return (mistake(words, 'other', ('instrument',), remedy),)
 
 
 class _Tried(NamedTuple):

@@ -33,6 +33,7 @@ from .evidence import Case, Finding, mistake
 from .lengths import capital, distance, falls, length, listed
 from .limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .mending import frames_fitted
+from .slips import Slip
 from .snapshot import KINDS, LENGTHS, Arm, Snapshot, of_joints, rough_models
 from .suspicions import doubles, robots, suspicions, turned_bases
 
@@ -44,7 +45,7 @@ GIVE_ITS_MODEL = (
 
 def mixups(case: Case) -> Sequence[Finding]:
     """Return what a gap comes from that no plausible arm leaves, if not from the arm."""
-    torn = _far(case.residuals) > UNEXPLAINED
+    torn = _far(case.residuals)[0] > UNEXPLAINED
     if case.gap < LARGE:
         return _torn(case) if torn else ()
     shot = case.snapshot
@@ -61,29 +62,34 @@ def mixups(case: Case) -> Sequence[Finding]:
     )
 
 
-def _far(parts: Sequence[Array]) -> float:
-    """Return how far off samples are [m], but for the few that may be anything."""
-    return float(np.quantile(np.concatenate([distance(part) for part in parts]), 1.0 - FEW))
+def _far(parts: Sequence[Array]) -> tuple[float, int]:
+    """Return how far off samples are [m] but for the few that may be anything, and where most."""
+    return max((float(np.quantile(distance(part), 1.0 - FEW)), k) for k, part in enumerate(parts))
 
 
 def _torn(case: Case) -> Sequence[Finding]:
     """Return that an arm fits most samples, and leaves of many others what no arm does."""
     shot = case.snapshot
     remaining = shot.problem.residuals(shot.arm.model)
-    if _far(remaining) < UNEXPLAINED:
+    far, k = _far(remaining)
+    if far < UNEXPLAINED:
         return ()
-    slips = tuple(slip.effect for slip in case.slips)
+    slips = tuple(each.effect for each in case.changes if isinstance(each, Slip))
     if slips:  # what gave way is told as that, if it is all that is wrong
         errors = (*of_joints(shot.robot, KINDS), *slips)
-        if _far(shot.problem.residuals(shot.bent(errors, WIDER))) < UNEXPLAINED:
+        if _far(shot.problem.residuals(shot.bent(errors, WIDER)))[0] < UNEXPLAINED:
             return ()
-    off = np.concatenate([distance(part) for part in remaining])
-    far = off > UNEXPLAINED
+    off = distance(remaining[k])
+    off = off[off > UNEXPLAINED]
     words = (
-        f'A plausible arm fits most of the measurements, and {far.mean():.0%} of them are off by '
-        f'{length(float(np.median(off[far])))} (median), more than any arm is.'
+        f'A plausible arm fits most of the measurements, but of {remaining[k].shape[1]} that were '
+        f'looked at in {case.recordings[k].name} {off.size} are off by '
+        f'{length(float(np.median(off)))} (median), more than any arm is.'
     )
-    remedy = 'Check that measurements and joint positions of one row belong together'
+    remedy = (
+        'Check that measurements and joint positions of one row belong together, and that base and '
+        'tool stayed where they are'
+    )
     return (mistake(words, 'other', ('instrument',), remedy),)
 
 

@@ -196,25 +196,26 @@ class RecordingRun:
         self._concluded = True
         lacking = self._shortfalls()
         counts: dict[str, Any] = {}
+        untold = set(self._untold()) if self._ending_since is not None else set[str]()
         for name, topic in self._topics.items():
             sent = self._book.sent(name)
             if name in lacking:
                 counts[name] = lacking[name].to_mapping()
+            elif self._book.tellers(name) & untold:
+                continue  # what was told last is from before the end
             elif sent is not None and 0 < sent.number <= topic.taken.number:
                 counts[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
         self._bag.note(COMPLETENESS, counts)
         sentences = [short.sentence(name) for name, short in lacking.items()]
         unknown = [name for name, topic in self._topics.items() if not topic.source.kind]
         sentences += [f'{name}: nobody published this topic' for name in unknown]
-        silent = set(self._book.silent_nodes())
-        if self._ending_since is not None:
-            silent.update(self._untold())
+        silent = {*self._book.silent_nodes(), *untold}
         sentences += [f'{named(node)} has not told what it sent' for node in sorted(silent)]
         if not self._joins:
             sentences += self._book.unheard(self._publishers)
         for k, sentence in enumerate(sentences):
             self._node.keep(f'incomplete {k}', sentence)
-        if counts and not lacking:
+        if counts and not lacking and not untold:
             total = sum(row['sent'] for row in counts.values())
             self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
 

@@ -13,13 +13,7 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.fit import Fit
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.diagnosis.algebra.workspace import (
-    SeedSystems,
-    Unit,
-    evidence,
-    ranking,
-    sized,
-)
+from weld_twin_core.diagnosis.algebra.workspace import SeedSystems, Unit, evidence, ranking
 from weld_twin_core.diagnosis.result import Site
 
 
@@ -73,7 +67,7 @@ def test_a_size_counts_as_often_as_machines_have_it():
     small = wt.effects.LinkLength('wrist_1_joint', da=1e-4)  # a fifth of the usual 0.5 mm
     model = Model(robot, (np.eye(4),), found=(large, small))
     expected = cauchy.logpdf([4.0, 0.2]) - cauchy.logpdf(0.0)
-    assert sized(Fit(model, np.zeros(0))) == pytest.approx(expected.sum())
+    assert Fit(model, np.zeros(0)).sized == pytest.approx(expected.sum())
 
 
 def test_a_column_of_noise_is_rarely_worth_its_freedom():

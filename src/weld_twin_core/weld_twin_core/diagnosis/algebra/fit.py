@@ -77,6 +77,18 @@ class Fit:
     def coordinates(self) -> Array:
         return coordinates(self.model)
 
+    @cached_property
+    def sized(self) -> float:
+        """
+        The log probability of the sizes of its effects, against that of none.
+
+        Cauchy's distribution about zero with the spread that machines have: most have little, and a
+        few have a fault of ten times that.
+        """
+        found, robot = self.model.found, self.model.robot
+        each = (effect.fit.coordinates() / spreads(robot, effect) for effect in found)
+        return -float(sum(np.log1p(size**2).sum() for size in each))
+
 
 def design(problem: Problem, model: Model, scale: Scale) -> Array:
     return designed(problem, model, scale).written_out()

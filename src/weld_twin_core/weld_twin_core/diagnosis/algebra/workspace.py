@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.plausible import spreads
 from ..beliefs import Beliefs
 from .columns import Columns, designed
 from .definite import Index, unit_diagonal
@@ -198,16 +197,14 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
     return np.asarray(-(count * np.log(remaining) + freedom * np.log(count)) / 2.0)
 
 
-def sized(result: Fit) -> float:
+def lead(own: Fit, now: Fit, freedom: float, effective: float) -> float:
     """
-    Return the log probability of the sizes of a fit's effects, against that of none.
+    Return the log Bayes factor by which one fit is ahead of another, with how often its sizes come.
 
-    Cauchy's distribution about zero with the spread that machines have: most have little, and a few
-    have a fault of ten times that.
+    freedom: coordinates that it has more.
+    effective: see `evidence`.
     """
-    robot = result.model.robot
-    each = (effect.fit.coordinates() / spreads(robot, effect) for effect in result.model.found)
-    return -float(sum(np.log1p(size**2).sum() for size in each))
+    return evidence(now.rss, now.rss - own.rss, freedom, effective) + own.sized - now.sized
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,8 +372,7 @@ class Workspace:
 
         more = float(own.coordinates.size - now.coordinates.size)
         count = self.independent((now, own))
-        lead = evidence(now.rss, now.rss - own.rss, more, count) + sized(own) - sized(now)
-        return lead - cost(own) + cost(now)
+        return lead(own, now, more, count) - cost(own) + cost(now)
 
     def hopeless(self, now: Fit) -> float:
         """Return the sum of squares from which on nothing can take the place of what was found."""

@@ -20,7 +20,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
-from ..algebra.workspace import Choice, Part, Role, Workspace, evidence, sized
+from ..algebra.workspace import Choice, Part, Role, Workspace, lead
 from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
@@ -53,9 +53,9 @@ def fit_alternatives(
             freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
             trials = max(choice.unit.trials, 1.0)
         # What may only stand beside what was found does so as the same on these data, however large.
-        own = full if choice is None or choice.unit.role is Role.FOUND else now
-        size = sized(own) - sized(rest) - float(np.log(trials))
-        return evidence(rest.rss, rest.rss - full.rss, freedom, count) + size
+        alike = choice is not None and choice.unit.role is not Role.FOUND
+        size = now.sized - full.sized if alike else 0.0
+        return lead(full, rest, freedom, count) + size - float(np.log(trials))
 
     out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:

@@ -14,7 +14,7 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit
 from ..algebra.problem import Model
-from ..algebra.workspace import Choice, Workspace, evidence, sized
+from ..algebra.workspace import Choice, Workspace, lead
 from ..beliefs import SHORTLIST
 from ..result import Site
 
@@ -76,8 +76,7 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
         worth = []
         for one, unit in tried:
             freedom = one.coordinates.size - now.coordinates.size
-            log_bayes = evidence(now.rss, now.rss - one.rss, freedom, count)
-            log_bayes += sized(one) - sized(now)
+            log_bayes = lead(one, now, freedom, count)
             worth.append((log_bayes - float(np.log(unit.trials)), one, unit))
         worth = [item for item in worth if item[0] > beliefs.enter_log_bayes]
         absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
@@ -138,8 +137,7 @@ def backward(work: Workspace, now: Fit) -> Fit:
         for k in (k for k, (rss, _) in enumerate(less) if rss < hopeless):
             one = work.without(now, k)
             freedom = now.coordinates.size - one.coordinates.size
-            worth[k] = evidence(one.rss, one.rss - now.rss, freedom, count)
-            worth[k] += sized(now) - sized(one)
+            worth[k] = lead(now, one, freedom, count)
         k = min(worth, key=worth.__getitem__, default=-1)
         if k < 0 or worth[k] >= beliefs.enter_log_bayes:
             k = int(np.argmin([size for _, size in less]))

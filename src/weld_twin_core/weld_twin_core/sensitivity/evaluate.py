@@ -104,8 +104,6 @@ def model(
 
     Parameters
     ----------
-    study : Study
-    tolerances : sequence of Tolerance
     exact : bool
         Run every draw exactly.
     seed : int

@@ -72,7 +72,6 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
     Parameters
     ----------
-    study : Study
     tolerance : Tolerance
         Says which parameter of which effect.
     values : array, shape (V,)
@@ -107,7 +106,6 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     Parameters
     ----------
-    tolerance : Tolerance
     count : int
         How many sizes, evenly spread.
 

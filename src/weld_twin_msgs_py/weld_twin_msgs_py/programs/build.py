@@ -5,6 +5,7 @@
 import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,11 +21,10 @@ from weld_twin_core.motion.programs.travel import Kind
 from .controllers import Controller, Frame
 from .source import Notation, Number, Source
 
-Suits = Callable[[Controller], Callable[[Array], Array]]
-"""Makes, for a controller, what tells the postures that a program asks for."""
-
-Astray = Callable[[Controller], Callable[[Array, Array], tuple[int, ...]]]
-"""Makes, for a controller, what tells the axes that leave where a point's flags have them."""
+Suits = Callable[[Controller, Array], Array]
+"""Tells, for a controller, the postures that a program asks for, of some (m, n)."""
+Astray = Callable[[Controller, Array, Array], tuple[int, ...]]
+"""Tells, for a controller, the axes that leave where a point's flags have them, before and after."""
 
 
 class Point(NamedTuple):
@@ -230,8 +230,8 @@ def _move(
         step.stop,
         step.dwell,
         step.duration,
-        None if step.suits is None else step.suits(controller),
-        None if step.astray is None else step.astray(controller),
+        None if step.suits is None else partial(step.suits, controller),
+        None if step.astray is None else partial(step.astray, controller),
         step.where,
         seam,
         along=along,
@@ -264,16 +264,16 @@ QUADRANT_DOUBT = np.radians(0.5)
 def turn_bits(turn: int) -> Suits:
     """Return what takes postures whose axes have the signs of T: bit k is axis k + 1 below 0."""
 
-    def suits(controller: Controller) -> Any:
-        def of(q: Array) -> Array:
-            axes = _shown(controller, q)
-            below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
-            fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
-            return np.asarray(fits.all(axis=1))
-
-        return of
+    def suits(controller: Controller, q: Array) -> Array:
+        return np.asarray((_against(turn, _shown(controller, q)) < SIGN_DOUBT).all(axis=1))
 
     return suits
+
+
+def _against(turn: int, axes: Array) -> Array:
+    """Return how far axes (..., n) are on the other side of zero than the signs of T say [rad]."""
+    below = np.array([bool(turn >> k & 1) for k in range(axes.shape[-1])])
+    return np.where(below, axes, -axes)
 
 
 FLAG_DOUBT = np.radians(1e-3)
@@ -291,16 +291,11 @@ WRIST: Flag = (5, 0.0, 2.0)
 def signs_kept(turn: int) -> Astray:
     """Return what tells the axes that have not the signs of T, as `turn_bits` takes it."""
 
-    def of(controller: Controller) -> Any:
-        def astray(_: Array, after: Array) -> tuple[int, ...]:
-            axes = _shown(controller, after)
-            below = np.array([bool(turn >> k & 1) for k in range(axes.size)])
-            away = np.where(below, axes, -axes)
-            return tuple((np.flatnonzero(away > FLAG_DOUBT) + 1).tolist())
+    def astray(controller: Controller, _: Array, after: Array) -> tuple[int, ...]:
+        away = _against(turn, _shown(controller, after))
+        return tuple((np.flatnonzero(away > FLAG_DOUBT) + 1).tolist())
 
-        return astray
-
-    return of
+    return astray
 
 
 def flags_kept(kind: Kind, point: Point, flags: Sequence[Flag]) -> Astray | None:
@@ -312,21 +307,18 @@ def flags_kept(kind: Kind, point: Point, flags: Sequence[Flag]) -> Astray | None
     if kind != 'joint' or point.notation.joints:
         return None
 
-    def of(controller: Controller) -> Any:
-        def astray(before: Array, after: Array) -> tuple[int, ...]:
-            both = np.stack([_shown(controller, q) for q in (before, after)])
-            moved = np.abs(both[1] - both[0]) > FLAG_DOUBT
-            out = set[int]()
-            for axis, angle, period in flags:
-                at = both[:, axis - 1 : axis]
-                sides = np.floor((at - angle * np.pi) / (period * np.pi))
-                if (sides[0] != sides[1]).any() and moved[axis - 1]:
-                    out.add(axis)
-            return tuple(sorted(out))
+    def astray(controller: Controller, before: Array, after: Array) -> tuple[int, ...]:
+        both = np.stack([_shown(controller, q) for q in (before, after)])
+        moved = np.abs(both[1] - both[0]) > FLAG_DOUBT
+        out = set[int]()
+        for axis, angle, period in flags:
+            at = both[:, axis - 1 : axis]
+            sides = np.floor((at - angle * np.pi) / (period * np.pi))
+            if (sides[0] != sides[1]).any() and moved[axis - 1]:
+                out.add(axis)
+        return tuple(sorted(out))
 
-        return astray
-
-    return of
+    return astray
 
 
 def _shown(controller: Controller, q: Array) -> Array:
@@ -342,19 +334,13 @@ def quadrants(conf: Sequence[int]) -> Suits:
     Its cfx is left out: what that means depends on the arm.
     """
 
-    def suits(controller: Controller) -> Any:
-        first = len(controller.external)
-        places = first + np.array([0, 3, 5])
-
-        def of(q: Array) -> Array:
-            if q.shape[1] < first + 6:
-                return np.ones(len(q), dtype=bool)
-            low = np.array(conf[:3]) * 0.5 * np.pi
-            axes = q[:, places]
-            inside = (axes > low - QUADRANT_DOUBT) & (axes < low + 0.5 * np.pi + QUADRANT_DOUBT)
-            return np.asarray(inside.all(axis=1))
-
-        return of
+    def suits(controller: Controller, q: Array) -> Array:
+        own = q[:, len(controller.external) :]
+        if own.shape[1] < 6:
+            return np.ones(len(q), dtype=bool)
+        low, axes = np.array(conf[:3]) * 0.5 * np.pi, own[:, [0, 3, 5]]
+        inside = (axes > low - QUADRANT_DOUBT) & (axes < low + 0.5 * np.pi + QUADRANT_DOUBT)
+        return np.asarray(inside.all(axis=1))
 
     return suits
 
@@ -362,11 +348,11 @@ def quadrants(conf: Sequence[int]) -> Suits:
 def nearest(near: Array) -> Suits:
     """Return what takes the posture nearest given joint positions, as qnear does."""
 
-    def of(q: Array) -> Array:
+    def suits(_: Controller, q: Array) -> Array:
         away = np.abs(q - near).sum(axis=1)
         return np.asarray(away == away.min())
 
-    return lambda _: of
+    return suits
 
 
 SAME = (5.1e-6, 5.1e-5)

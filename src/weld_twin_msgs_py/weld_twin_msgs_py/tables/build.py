@@ -23,7 +23,7 @@ from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Rec
 from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
 from .header import Columns, find_columns
-from .joint_readings import FITS, Units, counted, joint_angles, joint_units
+from .joint_readings import FITS, JointColumns, Units, counted
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
 from .words import EULER_ORDERS, OWN, ROTATION_VECTOR, TableOptions, flag_of, tokens
 
@@ -194,10 +194,9 @@ class _Reading:
         """Return what the table means, and the units of the joints whose columns name none."""
         cells, robot, columns, said = self.cells, self.robot, self.columns, self.said
         said.append('joint columns are ' + ', '.join(columns.joints))
-        raw = cells.stack(columns.joints)
         judge = replace(self, said=[])._relative_misfit
-        units = joint_units(raw, robot, columns.joints, self.options, said, judge)
-        q = joint_angles(cells, robot, columns.joints, self.options, said, units)
+        units = self._joints.units(cells.stack(columns.joints), judge)
+        q = self._joints.angles(cells, units)
         position, scale = self._position(q)
         rotation = self._rotation(q) if columns.rotation else None
         sigma = self._sigma(scale) if columns.sigma else None
@@ -221,6 +220,10 @@ class _Reading:
         )
         return Table(recording, tuple(said)), units
 
+    @property
+    def _joints(self) -> JointColumns:
+        return JointColumns(self.robot, self.columns.joints, self.options, self.said)
+
     def _clock(self) -> tuple[int, Array]:
         """Return what the stamps count from [ns since 1970] and the stamps, shape (M,) [s]."""
         named = self.columns
@@ -242,7 +245,7 @@ class _Reading:
         if t is None:
             return seen
         begin = log.lines.index(self.cells.lines[0])
-        q = joint_angles(log, self.robot, named.joints, self.options, [], units)
+        q = self._joints._replace(said=[]).angles(log, units)
         return JointMotion(t - t[begin] + seen.t[0], q)
 
     def _temperature(self, t: Array) -> Signal | None:
@@ -434,10 +437,7 @@ class _Reading:
         for words, other in self._others():
             with suppress(DataError):
                 quiet = replace(other, said=[])
-                read = joint_angles(
-                    quiet.cells, self.robot, self.columns.joints, quiet.options, []
-                )
-                result.append((quiet._relative_misfit(read), words))
+                result.append((quiet._relative_misfit(quiet._joints.angles(quiet.cells)), words))
         return min(result)[1]
 
     def _others(self) -> Iterator[tuple[str, '_Reading']]:

@@ -22,7 +22,7 @@ from ..messages.image_points import label
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import joint_columns, time_columns, unit_of
-from .joint_readings import counted, station_joints
+from .joint_readings import JointColumns, counted
 from .unit_guess import METRES, factor, stamps
 from .words import TableOptions, shortened
 
@@ -238,7 +238,7 @@ def read_pixels(
     said.append('joint columns are ' + ', '.join(joints))
     image, first = cells.alike([*joints, *([columns['image']] if 'image' in columns else [])])
     stations = cells.taken(first)
-    q = station_joints(stations, robot, joints, options, said)
+    q = JointColumns(robot, joints, options, said).stations(stations)
     t = _clock(stations, said)
     seen = _sightings(cells, columns, cameras, targets, image, t)
     recording = Recording(

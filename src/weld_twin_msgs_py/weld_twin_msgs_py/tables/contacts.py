@@ -19,7 +19,7 @@ from ..files.whole_files import write_text
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import CONTACTS, joint_columns, unit_of
-from .joint_readings import counted, station_joints
+from .joint_readings import JointColumns, counted
 from .unit_guess import METRES, factor
 from .words import TableOptions, shortened
 
@@ -98,7 +98,7 @@ def read_contacts(
     said.append('joint columns are ' + ', '.join(joints))
     kept = cells.taken(k for k in range(len(cells.rows)) if k + 1 not in options.skip_rows)
     cells = _once(kept, [*joints, *columns.values()], said)
-    q = station_joints(cells, robot, joints, options, said)
+    q = JointColumns(robot, joints, options, said).stations(cells)
     labels = _labels(cells, columns, alone)
     value = _lengths(cells, columns.get('value'), options, said)
     sigma = _lengths(cells, columns.get('sigma'), options, said)

@@ -3,7 +3,7 @@
 """Which column is what, from the names in the header."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from weld_twin_core.arm.robot import Robot
@@ -176,7 +176,7 @@ def _beside_the_arm(parts: Sequence[Named]) -> list[str]:
     result = {}
     for part in parts:
         words = [word for word in part.stem or (part.axis,) if word]
-        pieces = [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        pieces = _pieces(words)
         if len(pieces) == 2 and pieces[0] in EXTERNAL and re.fullmatch('[a-f1-6]', pieces[1]):
             result[pieces[1]] = part.name
     return [result[key] for key in sorted(result)]
@@ -210,8 +210,7 @@ def _efforts(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
     named: dict[str, str] = {}
     numbered: dict[int, str] = {}
     for part in parts:
-        words = parted(part.name)[0]
-        pieces = [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        pieces = _pieces(parted(part.name)[0])
         if not set(pieces) & EFFORT:
             continue
         rest = [piece for piece in pieces if piece not in EFFORT]
@@ -227,6 +226,11 @@ def _efforts(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
     return tuple(numbered[k] for k in wanted) if sorted(numbered) == list(wanted) else ()
 
 
+def _pieces(words: Iterable[str]) -> list[str]:
+    """Return words and the numbers in them apart, as j and 1 of j1."""
+    return [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+
+
 def _rank(words: tuple[str, ...]) -> int:
     return 2 if set(words) & MEASURED else 0 if set(words) & TARGET else 1
 
@@ -237,7 +241,7 @@ def _numbered(parts: Sequence[Named]) -> dict[tuple[str, ...], dict[int, str]]:
     for part in parts:
         if part.axis:
             continue
-        pieces = [piece for word in part.stem for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        pieces = _pieces(part.stem)
         numbers = [int(piece) for piece in pieces if piece.isdecimal()]
         words = tuple(piece for piece in pieces if not piece.isdecimal())
         known = JOINT | MEASURED | TARGET

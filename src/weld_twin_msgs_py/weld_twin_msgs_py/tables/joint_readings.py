@@ -3,10 +3,12 @@
 """The joint columns of a table: each in its unit, counted as the model counts them."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from itertools import product, starmap
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
@@ -38,114 +40,94 @@ class Units(NamedTuple):
     slide: str
 
 
-def station_joints(
-    cells: Cells, robot: Robot, names: tuple[str, ...], options: TableOptions, said: list[str]
-) -> Array:
-    """Return `joint_angles` of stations; refuses a row that lacks one."""
-    q = joint_angles(cells, robot, names, options, said)
-    gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
-    if gaps.size:
-        line = cells.lines[gaps[0]]
-        raise DataError(f"table '{cells.path}' line {line} has an empty joint angle")
-    return q
-
-
 Judge = Callable[[Array], float]
 """Joint positions as the model counts them, shape (M, n) [rad, m], to how far off they are."""
 
 
-def joint_angles(
-    cells: Cells,
-    robot: Robot,
-    names: tuple[str, ...],
-    options: TableOptions,
-    said: list[str],
-    units: Units | None = None,
-) -> Array:
-    """
-    Return the joint columns of a table, shape (M, n) [rad or m], and say how they were read.
+class JointColumns(NamedTuple):
+    """The columns of a robot's joints, what a user says of them, and the sentences of what is found."""
 
-    Where neither names nor ``units`` tell it, the size of the numbers does.
-    """
-    q = cells.stack(names)
-    if units is None:
-        units = joint_units(q, robot, names, options, said)
-    q = _in_model(q, units, robot, names, options, said)
-    outside = ((q < robot.lower - 1e-6) | (q > robot.upper + 1e-6)).any(axis=1)
-    if outside.any():
-        said.append(f'{outside.sum()} rows leave the joint limits of robot {robot.name!r}')
-    return q
+    robot: Robot
+    names: tuple[str, ...]
+    options: TableOptions
+    said: list[str]
 
+    def stations(self, cells: Cells) -> Array:
+        """Return `angles` of stations; refuses a row that lacks one."""
+        q = self.angles(cells)
+        gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
+        if gaps.size:
+            line = cells.lines[gaps[0]]
+            raise DataError(f"table '{cells.path}' line {line} has an empty joint angle")
+        return q
 
-def joint_units(
-    q: Array,
-    robot: Robot,
-    names: Sequence[str],
-    options: TableOptions,
-    said: list[str],
-    judge: Judge | None = None,
-) -> Units:
-    """Return the units of the columns without one of their own."""
-    turning, sliding = ~robot.prismatic, robot.prismatic
-    units = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
-    angle = 'deg' if largest(q[:, turning]) > _TURN else 'rad'
-    usual = Units(units[0] or angle, units[1] or _usual_slide(q, robot))
-    chosen = usual
-    if judge is not None and len(q) >= ENOUGH:
-        open_angle = units[0] is None and bool(turning.any())
-        open_slide = units[1] is None and bool(sliding.any())
-        others = [
-            Units(angle, slide)
-            for angle in (('rad', 'deg') if open_angle else (usual.angle,))
-            for slide in (('m', 'mm') if open_slide else (usual.slide,))
-        ]
-        chosen = _fitting(q, usual, others, robot, names, options, judge)
-    fitted = ' (the measured positions fit no other unit)' if chosen != usual else ''
-    if units[0] is None and turning.any():
-        word = {'deg': 'degrees', 'rad': 'radians'}[chosen.angle]
-        size = largest(q[:, turning])
-        said.append(f'joint angles are in {word} (up to {size:.4g}){fitted}')
-    if units[1] is None and sliding.any():
-        size = largest(q[:, sliding])
-        said.append(
-            f'sliding joints are in {chosen.slide} (up to {size:.4g}){fitted}; --slide-unit decides'
+    def angles(self, cells: Cells, units: Units | None = None) -> Array:
+        """
+        Return the columns, shape (M, n) [rad or m], and say how they were read.
+
+        Where neither names nor ``units`` tell it, the size of the numbers does.
+        """
+        robot, q = self.robot, cells.stack(self.names)
+        q = self._in_model(q, self.units(q) if units is None else units)
+        outside = ((q < robot.lower - 1e-6) | (q > robot.upper + 1e-6)).any(axis=1)
+        if outside.any():
+            self.said.append(
+                f'{outside.sum()} rows leave the joint limits of robot {robot.name!r}'
+            )
+        return q
+
+    def units(self, q: Array, judge: Judge | None = None) -> Units:
+        """Return the units of the columns without one of their own, by their numbers (M, n)."""
+        slides = self.robot.prismatic
+        angle = self._given(~slides, self.options.angle_unit)
+        slide = self._given(slides, self.options.slide_unit)
+        size = largest(q[:, ~slides])
+        usual = Units(
+            angle or ('deg' if size > _TURN else 'rad'), slide or _usual_slide(q, self.robot)
         )
-    return chosen
+        open_angle, open_slide = angle is None and not slides.all(), slide is None and slides.any()
+        chosen = usual
+        if judge is not None and len(q) >= ENOUGH and (open_angle or open_slide):
+            angles = ('rad', 'deg') if open_angle else (usual.angle,)
+            others = product(angles, ('m', 'mm') if open_slide else (usual.slide,))
+            chosen = self._fitting(q, usual, starmap(Units, others), judge)
+        fitted = ' (the measured positions fit no other unit)' if chosen != usual else ''
+        if open_angle:
+            word = {'deg': 'degrees', 'rad': 'radians'}[chosen.angle]
+            self.said.append(f'joint angles are in {word} (up to {size:.4g}){fitted}')
+        if open_slide:
+            self.said.append(
+                f'sliding joints are in {chosen.slide} (up to {largest(q[:, slides]):.4g}){fitted}; '
+                '--slide-unit decides'
+            )
+        return chosen
 
+    def _given(self, meant: NDArray[np.bool_], option: str | None) -> str | None:
+        """Return the unit that an option or the header gives one of some columns."""
+        own = (unit_of(name) for name, one in zip(self.names, meant, strict=True) if one)
+        return option or next((unit for unit in own if unit), None)
 
-def _in_model(
-    q: Array,
-    units: Units,
-    robot: Robot,
-    names: Sequence[str],
-    options: TableOptions,
-    said: list[str],
-) -> Array:
-    """Return joint columns, shape (M, n), in SI units and as the model counts them."""
-    scale = np.empty(robot.n)
-    for k, (name, slides) in enumerate(zip(names, robot.prismatic, strict=True)):
-        table, given, usual = (
-            (METRES, options.slide_unit, units.slide)
-            if slides
-            else (RADIANS, options.angle_unit, units.angle)
-        )
-        what = f'{robot.joint_names[k]}, which {"slides" if slides else "turns"}'
-        scale[k] = factor(table, given or unit_of(name) or usual, name, what)
-    return as_modelled(q * scale, robot, options, said)
+    def _fitting(self, q: Array, usual: Units, others: Iterable[Units], judge: Judge) -> Units:
+        """Return the usual units, or others that the measured positions fit far better."""
+        quiet = self._replace(said=[])
+        off = {units: judge(quiet._in_model(q, units)) for units in (usual, *others)}
+        best = min(off, key=lambda units: off[units])
+        fits = off[best] < FITS and off[best] * CLEARLY < off[usual]
+        return best if fits else usual
 
-
-def _kinds(robot: Robot, options: TableOptions) -> tuple[tuple[Sequence[bool], str | None], ...]:
-    turns = [not slides for slides in robot.prismatic]
-    return (
-        (turns, options.angle_unit),
-        ([bool(slides) for slides in robot.prismatic], options.slide_unit),
-    )
-
-
-def _given_unit(names: Sequence[str], kind: Sequence[bool], given: str | None) -> str | None:
-    """Return the unit that an option or the header gives one of some columns."""
-    own = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
-    return given or next((unit for unit in own if unit), None)
+    def _in_model(self, q: Array, units: Units) -> Array:
+        """Return columns, shape (M, n), in SI units and as the model counts them."""
+        robot, options = self.robot, self.options
+        scale = np.empty(robot.n)
+        for k, (name, slides) in enumerate(zip(self.names, robot.prismatic, strict=True)):
+            table, given, usual = (
+                (METRES, options.slide_unit, units.slide)
+                if slides
+                else (RADIANS, options.angle_unit, units.angle)
+            )
+            what = f'{robot.joint_names[k]}, which {"slides" if slides else "turns"}'
+            scale[k] = factor(table, given or unit_of(name) or usual, name, what)
+        return as_modelled(q * scale, robot, options, self.said)
 
 
 def _usual_slide(q: Array, robot: Robot) -> str:
@@ -160,26 +142,6 @@ def _usual_slide(q: Array, robot: Robot) -> str:
     if largest(values) > _LONGEST or (inside['mm'] and not inside['m']):
         return 'mm'
     return 'm'
-
-
-def _fitting(
-    q: Array,
-    usual: Units,
-    others: Sequence[Units],
-    robot: Robot,
-    names: Sequence[str],
-    options: TableOptions,
-    judge: Judge,
-) -> Units:
-    """Return the usual units, or others that the measured positions fit far better."""
-    if len(others) < 2:
-        return usual
-    off = {
-        units: judge(_in_model(q, units, robot, names, options, [])) for units in (usual, *others)
-    }
-    best = min(off, key=lambda units: off[units])
-    fits = off[best] < FITS and off[best] * CLEARLY < off[usual]
-    return best if fits else usual
 
 
 def as_modelled(q: Array, robot: Robot, options: TableOptions, said: list[str]) -> Array:

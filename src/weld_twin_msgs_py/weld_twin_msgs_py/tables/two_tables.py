@@ -16,7 +16,7 @@ from weld_twin_core.recording import JointMotion
 from .build import BEYOND, LAST_STAMP, Table, own_epoch, table_and_units, table_of
 from .cells import Cells, number, read_cells
 from .header import joint_columns, time_columns, unit_of
-from .joint_readings import joint_angles
+from .joint_readings import JointColumns
 from .unit_guess import later_rows, stamps
 from .words import TableOptions
 
@@ -117,7 +117,7 @@ def _moving(
     options = replace(options, time_column=None)  # both share one now
     (one, said_all), units = table_and_units(both, robot, options, said)
     begin = one.epoch_ns * 1e-9
-    whole = joint_angles(log, robot, names, options, [], units)
+    whole = JointColumns(robot, names, options, []).angles(log, units)
     recording = replace(
         one,
         joints=JointMotion(times - begin, whole),

@@ -59,7 +59,8 @@ def read_two_tables(
     points = _later(seen, options, result)
     times, own = _stamps(stream, options, result), _stamps(points, options, result)
     if times is None or own is None or not _stream(times):
-        return _paired(log, seen, names, robot, options, said)
+        paired = _paired(log, seen, names, options, said)
+        return table_of(paired, robot, replace(options, time_column=None), said)
     said += result
     dated = bool(min(times[0], own[0]) > SINCE_1970)
     if dated and max(times[-1], own[-1]) >= LAST_STAMP:
@@ -71,19 +72,20 @@ def read_two_tables(
             'both clocks are taken to begin with the first row of their file; --clock-offset '
             "shifts the instrument's"
         )
-    q = stream.stack(names)
-    return _moving(stream, points, robot, options, said, (names, q, times, own + offset, dated))
+    # What was measured is read as one table first, to find out its units; both share a clock now.
+    options = replace(options, time_column=None)
+    both = _between(stream, points, names, times, own + offset)
+    (one, notes), units = table_and_units(both, robot, options, said)
+    q = JointColumns(robot, names, options, []).angles(stream, units)
+    epoch = one.epoch_ns if dated else own_epoch(stream.path)
+    motion = JointMotion(times - one.epoch_ns * 1e-9, q)
+    return Table(replace(one, joints=motion, epoch_ns=epoch, notes=notes), notes)
 
 
 def _paired(
-    log: Cells,
-    seen: Cells,
-    names: tuple[str, ...],
-    robot: Robot,
-    options: TableOptions,
-    said: list[str],
-) -> Table:
-    """Return stations: row belongs to row."""
+    log: Cells, seen: Cells, names: tuple[str, ...], options: TableOptions, said: list[str]
+) -> Cells:
+    """Return one table of stations: row belongs to row."""
     if len(log.rows) != len(seen.rows):
         raise DataError(
             f"'{log.path}' has {len(log.rows)} rows and '{seen.path}' {len(seen.rows)}, and "
@@ -92,39 +94,19 @@ def _paired(
         )
     own = _stamps(seen, options, said)
     said.append('rows of both files are paired in their order')
-    joined = _joined(log, seen, names, log.stack(names), own)
-    return table_of(joined, robot, replace(options, time_column=None), said)
+    return _joined(log, seen, names, log.stack(names), own)
 
 
-def _moving(
-    log: Cells,
-    seen: Cells,
-    robot: Robot,
-    options: TableOptions,
-    said: list[str],
-    joined: tuple[tuple[str, ...], Array, Array, Array, bool],
-) -> Table:
-    """Return a motion: what was measured is read as one table first, to find out its units."""
-    names, q, times, own, dated = joined
+def _between(log: Cells, seen: Cells, names: tuple[str, ...], times: Array, own: Array) -> Cells:
+    """Return one table of what was measured in a motion, with the joints at its stamps [s]."""
     inside = np.flatnonzero((own >= times[0]) & (own <= times[-1]))
     if not inside.size:
         raise DataError(
             f"no row of '{seen.path}' lies within the time of '{log.path}'; --clock-offset shifts "
             'the clock of the instrument'
         )
-    at = np.column_stack([np.interp(own[inside], times, column) for column in q.T])
-    both = _joined(log, seen.taken(inside), names, at, own[inside])
-    options = replace(options, time_column=None)  # both share one now
-    (one, said_all), units = table_and_units(both, robot, options, said)
-    begin = one.epoch_ns * 1e-9
-    whole = JointColumns(robot, names, options, []).angles(log, units)
-    recording = replace(
-        one,
-        joints=JointMotion(times - begin, whole),
-        epoch_ns=one.epoch_ns if dated else own_epoch(log.path),
-        notes=said_all,
-    )
-    return Table(recording, said_all)
+    q = np.column_stack([np.interp(own[inside], times, column) for column in log.stack(names).T])
+    return _joined(log, seen.taken(inside), names, q, own[inside])
 
 
 def _pointed(text: str) -> str:

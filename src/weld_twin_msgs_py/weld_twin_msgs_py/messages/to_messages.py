@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -23,21 +24,16 @@ LEVELS = (b'\x00', b'\x01', b'\x02', b'\x03')
 """Levels of a DiagnosticStatus: ok, warn, error, stale."""
 
 
+@dataclass(frozen=True)
 class Messages:
     """Makes messages of one flavour; use `ros_messages` or `bag_messages`."""
 
-    def __init__(
-        self,
-        lookup: Callable[[str], Any],
-        numbers: Callable[[Array], Any],
-        level: Callable[[int], Any],
-    ) -> None:
-        self._lookup = lookup
-        self._numbers = numbers
-        self._level = level
+    lookup: Callable[[str], Any]
+    numbers: Callable[[Array], Any]
+    level: Callable[[int], Any]
 
     def _make(self, kind: str, **fields: Any) -> Any:
-        return self._lookup(kind)(**fields)
+        return self.lookup(kind)(**fields)
 
     def _stamped(self, kind: str, ns: int, frame_id: str, /, **fields: Any) -> Any:
         return self._make(kind, header=self.header(ns, frame_id), **fields)
@@ -67,9 +63,9 @@ class Messages:
             ns,
             frame_id,
             name=list(names),
-            position=self._numbers(np.asarray(q, dtype=np.float64)),
-            velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
-            effort=self._numbers(empty if effort is None else np.asarray(effort, dtype=float)),
+            position=self.numbers(np.asarray(q, dtype=np.float64)),
+            velocity=self.numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
+            effort=self.numbers(empty if effort is None else np.asarray(effort, dtype=float)),
         )
 
     def _xyz(self, kind: str, value: Array) -> Any:
@@ -204,7 +200,7 @@ class Messages:
         ]
         return self._make(
             'diagnostic_msgs/msg/DiagnosticStatus',
-            level=self._level(status.level),
+            level=self.level(status.level),
             name=status.name,
             message=status.message,
             hardware_id=status.hardware_id,
@@ -223,7 +219,7 @@ class Messages:
             out.append(
                 self._make(
                     'trajectory_msgs/msg/JointTrajectoryPoint',
-                    **dict(zip(fields, map(self._numbers, rows), strict=True)),
+                    **dict(zip(fields, map(self.numbers, rows), strict=True)),
                     time_from_start=self._make(
                         'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec
                     ),
@@ -251,7 +247,7 @@ class Messages:
         )
 
     def _lines(self, ns: int, frame_id: str, lines: Lines) -> Any:
-        kinds = self._lookup('visualization_msgs/msg/Marker')
+        kinds = self.lookup('visualization_msgs/msg/Marker')
         colors = [
             self._make('std_msgs/msg/ColorRGBA', r=float(r), g=float(g), b=float(b), a=1.0)
             for r, g, b in lines.colors
@@ -299,9 +295,8 @@ def quaternion(rotation: Array) -> list[float]:
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
     trace = xx + yy + zz
-    if trace > max(
-        xx, yy, zz
-    ):  # the largest part of the quaternion: dividing by it loses no digits
+    # Dividing by the largest part of the quaternion loses no digits.
+    if trace > max(xx, yy, zz):
         x, y, z, w = zy - yz, xz - zx, yx - xy, 1.0 + trace
     elif xx >= yy and xx >= zz:
         x, y, z, w = 1.0 + 2.0 * xx - trace, xy + yx, xz + zx, zy - yz

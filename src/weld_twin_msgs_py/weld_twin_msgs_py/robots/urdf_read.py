@@ -14,6 +14,7 @@ from weld_twin_core.arm.robot import STANDARD_GRAVITY, Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
+from ..files.yaml_file import read_text
 from .urdf_tree import (
     CORRECTED,
     FLANGE,
@@ -69,12 +70,12 @@ def read_urdf(
         The file is no usable URDF, or the chain between the links is no serial arm.
 
     """
-    return _of_tree(read_tree(path), path, base_link, tip_link, flange_link)
+    return parse_urdf(read_text(path, 'URDF'), path, base_link, tip_link, flange_link)
 
 
 def parse_urdf(
     text: str,
-    source: str,
+    source: Path | str,
     base_link: str | None = None,
     tip_link: str | None = None,
     flange_link: str | None = None,
@@ -88,7 +89,22 @@ def parse_urdf(
         The text is no usable URDF, or the chain between the links is no serial arm.
 
     """
-    return _of_tree(parse_tree(text, source), source, base_link, tip_link, flange_link)
+    tree = parse_tree(text, source)
+    try:
+        base = _base(tree, base_link)
+        tip = _tip(tree, base, tip_link)
+        chain = _chain(tree, base, tip)
+        root = chain.down[0].parent if chain.up else base
+        robot = _robot(tree, chain.down, _gravity(tree, root), chain.start, source)
+        origin = foot_of(tree, root, chain.down, None if chain.up else base_link)
+        flange = flange_link_of(tree, chain.down, tip, flange_link)
+        robot = replace(robot, controller=_controller(robot, origin, flange))
+        if chain.up:
+            robot = _beside(tree, chain, robot, source)
+        refuse_wrong_units(robot)
+    except ModelError as error:
+        raise ModelError(f"URDF '{source}': {error}") from None
+    return robot
 
 
 class Chain(NamedTuple):
@@ -106,30 +122,6 @@ def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | Non
     tree = read_tree(path)
     base = _base(tree, base_link)
     return _chain(tree, base, _tip(tree, base, tip_link))
-
-
-def _of_tree(
-    tree: Tree,
-    path: Path | str,
-    base_link: str | None,
-    tip_link: str | None,
-    flange_link: str | None,
-) -> Robot:
-    try:
-        base = _base(tree, base_link)
-        tip = _tip(tree, base, tip_link)
-        chain = _chain(tree, base, tip)
-        root = chain.down[0].parent if chain.up else base
-        robot = _robot(tree, chain.down, _gravity(tree, root), chain.start, path)
-        origin = foot_of(tree, root, chain.down, None if chain.up else base_link)
-        flange = flange_link_of(tree, chain.down, tip, flange_link)
-        robot = replace(robot, controller=_controller(robot, origin, flange))
-        if chain.up:
-            robot = _beside(tree, chain, robot, path)
-        refuse_wrong_units(robot)
-    except ModelError as error:
-        raise ModelError(f"URDF '{path}': {error}") from None
-    return robot
 
 
 def _beside(tree: Tree, chain: Chain, robot: Robot, path: Path | str) -> Robot:

@@ -300,7 +300,43 @@ class _Look(NamedTuple):
         gain /= scatter
         if gain[best] <= self.bar[best]:
             return None
-        return _described(self.series, system, self.shapes, gain, best, self.sooner, scatter)
+        return self._described(system, gain, best, scatter)
+
+    def _described(
+        self, system: _System, gain: Array, best: tuple[int, int], scatter: float
+    ) -> tuple[_Term, Change]:
+        """Return the simplest change that explains as much as the best, and what else would."""
+        shapes, series = self.shapes, self.series
+        kind, top = shapes[best[0]].kind, gain[best]
+        same = [k for k, each in enumerate(shapes) if each.kind == kind]
+        most = gain[same].max(axis=0)
+        alike = np.flatnonzero(most > top - _ALIKE)
+        at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
+        odds = {
+            j: system.odds(shapes[k], j, scatter) + float(self.sooner[j]) for j, k in at.items()
+        }
+        place = max(odds, key=lambda j: odds[j])
+        shape = shapes[at[place]]
+        near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
+        ranked = sorted(odds, key=lambda j: -odds[j])
+        others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
+        # From where on a trend explains as much as a step.
+        slow = [
+            each.begin
+            for each, explained in zip(shapes, gain[:, place], strict=True)
+            if kind == 'step' and each.kind == 'trend' and explained > top - _ALIKE
+        ]
+        first = max(min(near) - (kind == 'step'), 0)
+        return _Term(shape, place), Change(
+            series.names[place],
+            kind,
+            float(series.days[shape.begin]),
+            (float(series.days[first]), float(series.days[max(near)])),
+            *system.size([shapes[k] for k in same], gain[same, place], place, scatter),
+            0.5 * float(most[place]),
+            tuple(series.names[k] for k in others),
+            float(series.days[min(slow)]) if slow else None,
+        )
 
     def settled(self, taken: Sequence[tuple[_Term, Change]]) -> list[tuple[_Term, Change]]:
         """Return the changes that are more than chance, each looked for once more beside all others."""
@@ -453,6 +489,38 @@ class _System:
             self._sizes[key] = self._fitted(shape)
         return self._sizes[key]
 
+    def size(
+        self, shapes: Sequence[_Shape], gain: Array, place: int, scatter: float
+    ) -> tuple[float, float]:
+        """Return the size of a change on a coordinate and its standard error, whenever it began."""
+        weight = np.exp(0.5 * (gain - gain.max()))
+        weight /= weight.sum()
+        sizes, variances = [], []
+        for shape in shapes:
+            mean, information = self.sizes(shape)
+            # Of a season, how far it swings; the worse known of its two parts says how well.
+            sizes.append(
+                float(np.hypot(*mean[place])) if mean.shape[1] == 2 else float(mean[place, 0])
+            )
+            variances.append(
+                scatter / max(float(np.linalg.eigvalsh(information[place])[0]), 1e-300)
+            )
+        middle = float(weight @ sizes)
+        spread = weight @ (np.array(variances) + (np.array(sizes) - middle) ** 2)
+        return middle, float(np.sqrt(spread))
+
+    def odds(self, shape: _Shape, place: int, scatter: float) -> float:
+        """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
+        mean, information = self.sizes(shape)
+        known = information[place] / scatter
+        # What was believed of a value holds for how far it moves over the recordings.
+        prior = self._series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
+        shown = known @ mean[place]
+        fall = shown @ np.linalg.solve(known + prior, shown)
+        return 0.5 * float(
+            fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1]
+        )
+
     def _fitted(self, shape: _Shape) -> tuple[Array, Array]:
         series = self._series
         places = series.changing
@@ -488,78 +556,3 @@ def _symmetric(blocks: list[list[Array]]) -> Array:
             here = np.ix_(range(starts[i], starts[i + 1]), range(starts[j], starts[j + 1]))
             out[here] = np.reshape(block, (sizes[i], sizes[j]))
     return np.asarray(np.tril(out) + np.tril(out, -1).T)
-
-
-def _described(
-    series: _Series,
-    system: _System,
-    shapes: Sequence[_Shape],
-    gain: Array,
-    best: tuple[int, int],
-    sooner: Array,
-    scatter: float,
-) -> tuple[_Term, Change]:
-    """Return the simplest change that explains as much as the best by its prior, and what else would."""
-    kind, top = shapes[best[0]].kind, gain[best]
-    same = [k for k, each in enumerate(shapes) if each.kind == kind]
-    most = gain[same].max(axis=0)
-    alike = np.flatnonzero(most > top - _ALIKE)
-    at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
-    odds = {
-        j: _odds(series, system, shapes[k], j, scatter) + float(sooner[j]) for j, k in at.items()
-    }
-    place = max(odds, key=lambda j: odds[j])
-    shape = shapes[at[place]]
-    near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
-    ranked = sorted(odds, key=lambda j: -odds[j])
-    others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
-    return _Term(shape, place), Change(
-        series.names[place],
-        kind,
-        float(series.days[shape.begin]),
-        (float(series.days[max(min(near) - (kind == 'step'), 0)]), float(series.days[max(near)])),
-        *_size(system, [shapes[k] for k in same], gain[same, place], place, scatter),
-        0.5 * float(most[place]),
-        tuple(series.names[k] for k in others),
-        _slowly(series, shapes, gain[:, place], top) if kind == 'step' else None,
-    )
-
-
-def _size(
-    system: _System, shapes: Sequence[_Shape], gain: Array, place: int, scatter: float
-) -> tuple[float, float]:
-    """Return the size of a change on a coordinate and its standard error, whenever it began."""
-    weight = np.exp(0.5 * (gain - gain.max()))
-    weight /= weight.sum()
-    sizes, variances = [], []
-    for shape in shapes:
-        mean, information = system.sizes(shape)
-        # Of a season, how far it swings; the worse known of its two parts says how well.
-        sizes.append(
-            float(np.hypot(*mean[place])) if mean.shape[1] == 2 else float(mean[place, 0])
-        )
-        variances.append(scatter / max(float(np.linalg.eigvalsh(information[place])[0]), 1e-300))
-    middle = float(weight @ sizes)
-    spread = weight @ (np.array(variances) + (np.array(sizes) - middle) ** 2)
-    return middle, float(np.sqrt(spread))
-
-
-def _slowly(series: _Series, shapes: Sequence[_Shape], gain: Array, top: float) -> float | None:
-    """Return the earliest day from which a trend explains as much as a step; None for none."""
-    begins = [
-        each.begin
-        for each, explained in zip(shapes, gain, strict=True)
-        if each.kind == 'trend' and explained > top - _ALIKE
-    ]
-    return float(series.days[min(begins)]) if begins else None
-
-
-def _odds(series: _Series, system: _System, shape: _Shape, place: int, scatter: float) -> float:
-    """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
-    mean, information = system.sizes(shape)
-    known = information[place] / scatter
-    # What was believed of a value holds for how far it moves over the recordings.
-    prior = series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
-    shown = known @ mean[place]
-    fall = shown @ np.linalg.solve(known + prior, shown)
-    return 0.5 * float(fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1])

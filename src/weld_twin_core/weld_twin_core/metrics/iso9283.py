@@ -35,8 +35,14 @@ DRIFT_CYCLES = 10
 """Cycles to a group whose accuracy is compared over time (clause 7.6)."""
 
 
+class _Plain:
+    def as_dict(self: Any) -> dict[str, Any]:
+        """Return the fields as plain numbers and tuples."""
+        return asdict(self)
+
+
 @dataclass(frozen=True)
-class PosePerformance:
+class PosePerformance(_Plain):
     """AP and RP of one commanded pose (clauses 7.2.1 and 7.2.2)."""
 
     cycles: int
@@ -52,13 +58,9 @@ class PosePerformance:
     components of a rotation vector [rad]; for the small turns meant here these are the standard's
     three angles."""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as plain numbers and tuples."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
-class PathPerformance:
+class PathPerformance(_Plain):
     """AT and RT of one commanded path (clauses 8.2 and 8.3)."""
 
     cycles: int
@@ -70,13 +72,9 @@ class PathPerformance:
     rt_index: int
     """Command point at which each was found."""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as plain numbers."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
-class DriftPerformance:
+class DriftPerformance(_Plain):
     """Drift of pose characteristics (clause 7.6)."""
 
     dap_m: float
@@ -85,10 +83,6 @@ class DriftPerformance:
     ap_m: tuple[float, ...]
     rp_m: tuple[float, ...]
     """AP and RP of every group [m]."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as plain numbers and tuples."""
-        return asdict(self)
 
 
 def pose_performance(
@@ -155,12 +149,18 @@ def path_performance(
     if len(attained) < 2:
         raise DataError(_too_few(len(attained)))
     goal = readonly(command, (None, 3), 'command path')
-    crossed = np.stack(
-        [
-            _normal_plane_crossings(path, goal, tangent, f'cycle {k}')
-            for k, path in enumerate(attained)
-        ]
-    )
+    direction = readonly(tangent, goal.shape, 'tangents of the command path')
+    crossed = np.empty((len(attained), *goal.shape))
+    for k, path in enumerate(attained):
+        points = readonly(path, (None, 3), 'attained path')
+        for i, (centre, normal) in enumerate(zip(goal, direction, strict=True)):
+            passed = nearest_pass(points, centre, normal)
+            if passed is None:
+                raise DataError(
+                    f'cycle {k} does not pass command point {i}; leave out the ends of the command '
+                    'path that not every cycle covers'
+                )
+            crossed[k, i] = passed
     return crossing_performance(crossed, goal)
 
 
@@ -174,30 +174,6 @@ def crossing_performance(crossed: Array, command: Array) -> PathPerformance:
 def along_path(crossed: Array, command: Array) -> tuple[Array, Array]:
     """Return accuracy and repeatability [m] at every point of a path, shape (m,) each."""
     return np.linalg.norm(crossed.mean(axis=0) - command, axis=-1), _repeatability(crossed)
-
-
-def _normal_plane_crossings(
-    path: ArrayLike, command: ArrayLike, tangent: ArrayLike, name: str = 'the path'
-) -> Array:
-    """
-    Return where a path (K, 3) passes the planes square to the command path, shape (m, 3) [m].
-
-    Of several passes the one nearest to the command point counts; the length of a tangent (m, 3)
-    does not matter. Raises DataError: the path never passes one of the planes.
-    """
-    points = readonly(path, (None, 3), 'attained path')
-    goal = readonly(command, (None, 3), 'command path')
-    direction = readonly(tangent, goal.shape, 'tangents of the command path')
-    out = np.empty_like(goal)
-    for i, (centre, normal) in enumerate(zip(goal, direction, strict=True)):
-        passed = nearest_pass(points, centre, normal)
-        if passed is None:
-            raise DataError(
-                f'{name} does not pass command point {i}; leave out the ends of the command path '
-                'that not every cycle covers'
-            )
-        out[i] = passed
-    return out
 
 
 def nearest_pass(points: Array, centre: Array, normal: Array) -> Array | None:

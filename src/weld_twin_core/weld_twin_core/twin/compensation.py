@@ -183,16 +183,14 @@ def rms_of(error: Array) -> float:
 
 
 _BEYOND_COMMANDS = frozenset(
-    [
+    (
         'measurement_scale',
-        'measurement_noise',
         'refraction',
-        'time_delay',
         'drift',
         'setup_step',
         'setup_settling',
         'instrument_knock',
-    ]
+    )
 )
 """Effects of the measurement, or new in every run: they do nothing to a motion to come."""
 _ROUNDING = 'quantization'

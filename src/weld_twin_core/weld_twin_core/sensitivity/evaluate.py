@@ -104,6 +104,8 @@ def model(
 
     Parameters
     ----------
+    study : Study
+    tolerances : sequence of Tolerance
     exact : bool
         Run every draw exactly.
     seed : int

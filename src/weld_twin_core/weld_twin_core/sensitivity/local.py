@@ -154,6 +154,7 @@ def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSen
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance
         Slopes are taken at no error; the forward difference uses the typical size.
 

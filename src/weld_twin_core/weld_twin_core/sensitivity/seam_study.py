@@ -91,6 +91,8 @@ def planned_study(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
     profile : Profile or str
         A time law, or the name of one with its default numbers.
     points : int
@@ -123,6 +125,8 @@ def study_of_plan(robot: Robot, planned: Plan, known: tuple[Effect, ...] = ()) -
 
     Parameters
     ----------
+    robot : Robot
+    planned : Plan
     known : tuple of Effect
         Effects believed to act.
 
@@ -146,10 +150,13 @@ def recorded_study(
 
     Parameters
     ----------
+    robot : Robot
+    recording : Recording
     points : int
         At most as many as there are measurements, or joint states without any.
     normal : array, shape (3,), optional
         Direction out of the work; left out, against the tool's z at every sample.
+    known : tuple of Effect
 
     Raises
     ------
@@ -309,6 +316,7 @@ def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
         At least 20.
     inputs : int
         Number of tolerances.
+    seed : int
 
     Raises
     ------

@@ -72,6 +72,7 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
     Parameters
     ----------
+    study : Study
     tolerance : Tolerance
         Says which parameter of which effect.
     values : array, shape (V,)
@@ -106,6 +107,7 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     Parameters
     ----------
+    tolerance : Tolerance
     count : int
         How many sizes, evenly spread.
 

@@ -223,6 +223,7 @@ def default_tolerances(
 
     Parameters
     ----------
+    robot : Robot
     families : iterable of str
         Names of effects; every joint gets those of a joint.
     scale : float
@@ -247,6 +248,11 @@ def tolerances_from_list(entries: Any, robot: Robot) -> tuple[Tolerance, ...]:
     An entry names an ``effect``, and may narrow it to a ``joint``, a ``parameter`` and an
     ``index``; the other keys are a distribution. A later entry replaces an earlier one of the
     same parameter.
+
+    Parameters
+    ----------
+    entries : sequence of mapping
+    robot : Robot
 
     Raises
     ------
@@ -360,6 +366,7 @@ def scaled(tolerances: Sequence[Tolerance], factors: Mapping[str, float]) -> tup
 
     Parameters
     ----------
+    tolerances : sequence of Tolerance
     factors : mapping of str to float
         Factor for the tolerances of an effect.
 

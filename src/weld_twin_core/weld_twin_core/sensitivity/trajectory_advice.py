@@ -40,6 +40,12 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     Return the root of the expected squared deviation at every path point, shape (N,) [m].
 
     To first order in the scatter, about the mean of every error.
+
+    Parameters
+    ----------
+    study : Study
+    tolerances : sequence of Tolerance
+
     """
     return _Scatter.of(study.known, tolerances).deviation(study)
 
@@ -102,6 +108,9 @@ def compare_profiles(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
     profiles : sequence of str
         Names of time laws.
     points : int
@@ -211,12 +220,16 @@ def advise(
 
     Parameters
     ----------
+    robot : Robot
+    path : Path
+    tolerances : sequence of Tolerance
     torch : Torch, optional
         As given; left out, upright on the seam.
     room : Room, optional
         How far the base may move, and how much room the arm must keep.
     tries : int
         Placements in the sample; the simplex search may take as many again for each free value.
+    seed : int
 
     Raises
     ------

@@ -65,8 +65,8 @@ def test_path_criteria_are_taken_square_to_the_path_whatever_the_sampling():
 
 def test_of_several_passes_through_a_plane_the_nearest_counts():
     there_and_there = np.concatenate([straight(0.5), straight(2e-3)])
-    found = iso9283._normal_plane_crossings(there_and_there, [[0.5, 0, 0]], [[1, 0, 0]])
-    np.testing.assert_allclose(found, [[0.5, 2e-3, 0]], atol=1e-12)
+    found = iso9283.nearest_pass(there_and_there, np.array([0.5, 0, 0]), np.array([1.0, 0, 0]))
+    np.testing.assert_allclose(found, [0.5, 2e-3, 0], atol=1e-12)
 
 
 def test_drift_is_the_largest_change_against_the_first_group():

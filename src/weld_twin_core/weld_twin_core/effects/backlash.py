@@ -84,7 +84,6 @@ class Backlash(MemoryEffect):
     width: Value = 0.0
     form: str = 'play'
 
-    name = 'backlash'
     traits = Traits(
         title='backlash',
         meaning='a gap in a gear (play): at every reversal the motor crosses it, and the arm stays',
@@ -256,7 +255,6 @@ class LoadedPlay(_BentByLoad):
     width: Value = 0.0
     torque: float = 1.0
 
-    name = 'loaded_play'
     traits = Traits(
         title='play under load',
         meaning='play whose side the load decides',
@@ -294,7 +292,6 @@ class Stiffening(_BentByLoad):
     compliance: Value = 0.0
     torque: float = 1.0
 
-    name = 'stiffening'
     traits = Traits(
         title='stiffening spring',
         meaning='a joint gives way under load, ever less the more it bears',

@@ -69,7 +69,6 @@ class BearingTilt(LinearEffect):
     lean: Value = (0.0, 0.0, 0.0, 0.0)
     second: Value = ()
 
-    name = 'bearing_tilt'
     traits = Traits(
         title='axis wobble',
         meaning='an axis leans as it turns, once or twice per turn',
@@ -201,7 +200,6 @@ class GuideTilt(_GuideError):
     joint: str
     rate: Value = (0.0, 0.0, 0.0)
 
-    name = 'guide_tilt'
     traits = replace(
         _GuideError.traits,
         title='tilting carriage',
@@ -237,7 +235,6 @@ class GuideBend(_GuideError):
     joint: str
     curvature: Value = (0.0, 0.0)
 
-    name = 'guide_bend'
     traits = replace(
         _GuideError.traits,
         title='bent guide',

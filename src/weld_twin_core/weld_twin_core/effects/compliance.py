@@ -99,7 +99,6 @@ class JointCompliance(LinearEffect):
     compliance: Value = 0.0
     statics: str = 'equilibrium'
 
-    name = 'joint_compliance'
     traits = Traits(
         title='compliance',
         meaning='a joint gives way under load, like a spring',
@@ -191,7 +190,6 @@ class PedestalTilt(LinearEffect):
 
     compliance: Value = (0.0, 0.0)
 
-    name = 'pedestal_tilt'
     traits = Traits(
         title='leaning pedestal',
         meaning="the pedestal under the robot bends under the arm's weight",
@@ -294,7 +292,6 @@ class AxisCompliance(LinearEffect):
     joint: str
     compliance: Value = 0.0
 
-    name = 'axis_compliance'
     traits = Traits(
         title='compliance across the axis',
         meaning='the bearing of a joint gives way when the load tips its axis',
@@ -344,7 +341,6 @@ class CartesianCompliance(LinearEffect):
 
     compliance: Value = (0.0, 0.0, 0.0)
 
-    name = 'cartesian_compliance'
     traits = Traits(
         title='compliance at the tool',
         meaning='the tool gives way under a force',
@@ -394,7 +390,6 @@ class ToolSag(LinearEffect):
 
     sag: Value = (0.0,) * 9
 
-    name = 'tool_sag'
     traits = Traits(
         title='sagging tool',
         meaning='the tool or its bracket bends under its own weight',

@@ -163,7 +163,6 @@ class JointCurve(Effect):
     over: str = 'angle'
     channel: str = 'q'
 
-    name = 'joint_curve'
     traits = Traits(
         title='measured curve',
         entered='program',
@@ -239,7 +238,6 @@ class FrameCurve(Effect):
     over: str = 'time'
     frame: str = 'base'
 
-    name = 'frame_curve'
     traits = Traits(
         title='measured motion',
         entered='program',

@@ -82,7 +82,6 @@ class JointSlip(Sudden, ChannelError):
     offset: Value = 0.0
     time: float = 0.0
 
-    name = 'joint_slip'
     traits = replace(
         Sudden.traits,
         title='slip',
@@ -126,7 +125,6 @@ class _SuddenFrame(Sudden, FrameError):
 class ToolSlip(_SuddenFrame):
     """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
 
-    name = 'tool_slip'
     traits = replace(
         _SuddenFrame.traits,
         title='slipped tool or reflector',
@@ -153,7 +151,6 @@ class ToolSlip(_SuddenFrame):
 class InstrumentKnock(_SuddenFrame):
     """The base is displaced by xyz in the world and turned by rotvec from ``time`` [s] on."""
 
-    name = 'instrument_knock'
     traits = replace(
         _SuddenFrame.traits,
         title='knocked instrument or base',
@@ -189,7 +186,6 @@ class SetupStep(_SetupMotion):
 
     time: float = 0.0
 
-    name = 'setup_step'
     traits = replace(
         _SetupMotion.traits,
         title='moved set-up',
@@ -229,7 +225,6 @@ class SetupSettling(_SetupMotion):
     time_constant: float = 600.0
     start: float = 0.0
 
-    name = 'setup_settling'
     traits = replace(
         _SetupMotion.traits,
         title='settling set-up',

@@ -10,6 +10,7 @@ and the diagnosis alike. What else it may tell of itself are the traits and grou
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
@@ -82,6 +83,7 @@ class Effect(ABC):
     """
 
     name: ClassVar[str]
+    """How files call it; left out, the name of the class as in `gear_ratio` of `GearRatio`."""
     parameters: ClassVar[tuple[Parameter, ...]]
     options: ClassVar[tuple[str, ...]] = ()
     """Fields that choose a variant and are never fitted."""
@@ -463,6 +465,8 @@ def register(effect: type[_E]) -> type[_E]:
     """
     if '__dataclass_fields__' not in vars(effect):
         effect = dataclass(frozen=True, eq=False)(effect)
+    if not hasattr(effect, 'name'):
+        effect.name = re.sub('(?<!^)(?=[A-Z])', '_', effect.__name__).lower()
     known = REGISTRY.get(effect.name)
     if known is not None and known.__qualname__ != effect.__qualname__:
         raise ModelError(f'an effect named {effect.name!r} is registered already')

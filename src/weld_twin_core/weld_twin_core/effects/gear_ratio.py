@@ -56,7 +56,6 @@ class GearRatio(LinearEffect):
     joint: str
     scale: Value = 0.0
 
-    name = 'gear_ratio'
     traits = Traits(
         title='gear ratio error',
         meaning='a joint turns by a constant factor too far',
@@ -114,7 +113,6 @@ class GearRatioByDirection(MemoryEffect):
     difference: Value = 0.0
     travel: Value = 1e-4
 
-    name = 'gear_ratio_by_direction'
     traits = Traits(
         title='gear ratio that differs by direction',
         meaning='the same, with another factor each way',
@@ -230,7 +228,6 @@ class JointCoupling(LinearEffect):
     source: str = ''
     ratio: Value = 0.0
 
-    name = 'joint_coupling'
     traits = Traits(
         title='coupling',
         meaning='turning one joint turns another a little',

@@ -61,7 +61,6 @@ class JointOffset(ChannelError):
     joint: str
     offset: Value = 0.0
 
-    name = 'joint_offset'
     traits = replace(
         ChannelError.traits,
         title='zero offset',
@@ -111,7 +110,6 @@ class LinkLength(_LinkError):
     joint: str
     da: Value = 0.0
 
-    name = 'link_length'
     traits = replace(
         _LinkError.traits,
         title='link length error',
@@ -135,7 +133,6 @@ class LinkOffset(_LinkError):
     joint: str
     dd: Value = 0.0
 
-    name = 'link_offset'
     traits = replace(
         _LinkError.traits,
         title='link offset error',
@@ -159,7 +156,6 @@ class LinkTwist(_LinkError):
     joint: str
     dalpha: Value = 0.0
 
-    name = 'link_twist'
     traits = replace(
         _LinkError.traits,
         title='link twist error',
@@ -182,7 +178,6 @@ class AxisParallelism(_LinkError):
     joint: str
     dbeta: Value = 0.0
 
-    name = 'axis_parallelism'
     traits = replace(
         _LinkError.traits,
         title='axis parallelism error',
@@ -257,7 +252,6 @@ _TOLD_ALONG = {
 class BasePose(FrameError):
     """The base is displaced by xyz in the world and turned by rotvec about its own origin."""
 
-    name = 'base_pose'
     traits = replace(
         FrameError.traits,
         title='base pose error',
@@ -297,7 +291,6 @@ class BasePose(FrameError):
 class ToolPose(FrameError):
     """The tool point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
 
-    name = 'tool_pose'
     traits = replace(
         FrameError.traits,
         title='tool pose error',
@@ -334,7 +327,6 @@ class _Search(SearchHooks):
 class RootPose(FrameError):
     """The positioner is displaced by xyz along the robot's base axes, and turned about its root."""
 
-    name = 'root_pose'
     traits = replace(
         FrameError.traits,
         title='root error of the positioner',

@@ -37,7 +37,6 @@ class MeasurementScale(LinearEffect):
 
     scale: Value = 0.0
 
-    name = 'measurement_scale'
     traits = Traits(
         title='scale error of the instrument',
         meaning="the instrument's millimetre is too long or too short",
@@ -75,7 +74,6 @@ class MeasurementNoise(Effect):
 
     sigma: Value = 0.0
 
-    name = 'measurement_noise'
     traits = Traits(
         depends_on='constant',
         place='instrument',
@@ -107,7 +105,6 @@ class TimeDelay(Effect):
 
     delay: Value = 0.0
 
-    name = 'time_delay'
     traits = Traits(
         title='clock delay',
         meaning='the measurements are stamped too late, or too early, by a constant time',
@@ -160,7 +157,6 @@ class ClockRate(Effect):
 
     rate: Value = 0.0
 
-    name = 'clock_rate'
     traits = Traits(
         title='clock that runs fast or slow',
         meaning='the two clocks drift apart',
@@ -208,7 +204,6 @@ class Drift(LinearEffect):
 
     xyz_rate: Value = (0.0, 0.0, 0.0)
 
-    name = 'drift'
     traits = Traits(
         title='drift of the frame',
         meaning='everything measured creeps with time',
@@ -262,7 +257,6 @@ class Refraction(LinearEffect):
     warming: Value = (0.0, 0.0, 0.0)
     instrument: Sequence[float] | None = None
 
-    name = 'refraction'
     traits = Traits(
         title='bent line of sight',
         meaning='warm air bends the beam of the instrument',

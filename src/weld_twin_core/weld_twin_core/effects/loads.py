@@ -56,7 +56,6 @@ class Payload(Effect):
     mass: Value = 0.0
     com: Value = (0.0, 0.0, 0.0)
 
-    name = 'payload'
     traits = Traits(
         title='wrong payload',
         meaning='the load at the flange is not what was declared',
@@ -127,7 +126,6 @@ class HosePull(LinearEffect):
     force: Value = (0.0, 0.0, 0.0)
     stiffness: Value = 0.0
 
-    name = 'hose_pull'
     traits = Traits(
         title='pull of the hose package',
         meaning='the hoses pull at the flange',

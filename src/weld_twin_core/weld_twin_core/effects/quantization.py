@@ -91,7 +91,6 @@ class Quantization(Effect):
     step: Value = 0.0
     phase: Value = 0.0
 
-    name = 'quantization'
     traits = Traits(
         title='encoder resolution',
         meaning='a joint is read in steps',

@@ -104,7 +104,6 @@ class Friction(MemoryEffect):
     release: float = 0.3
     recovery: Value = 0.0
 
-    name = 'friction'
     traits = Traits(
         title='friction',
         meaning='a joint lags behind while it moves, and gives that up when it rests',
@@ -293,7 +292,6 @@ class Hysteresis(MemoryEffect):
     amplitude: Value = 0.0
     travel: Value = 0.03
 
-    name = 'hysteresis'
     traits = Traits(
         title='hysteresis',
         meaning='a joint stays behind where it came from, more the farther it came',

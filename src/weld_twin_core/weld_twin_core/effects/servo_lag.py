@@ -83,7 +83,6 @@ class ServoLag(MemoryEffect):
     time_constant: Value = 0.0
     damping: float | None = None
 
-    name = 'servo_lag'
     traits = Traits(
         title='servo lag',
         meaning='the drive trails behind its command',
@@ -255,7 +254,6 @@ class Vibration(MemoryEffect):
     damping: Value = 0.05
     gain: Value = 0.0
 
-    name = 'vibration'
     traits = Traits(
         title='vibration',
         meaning='a joint swings after it was accelerated',

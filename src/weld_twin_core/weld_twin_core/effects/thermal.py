@@ -36,7 +36,6 @@ class ThermalGrowth(LinearEffect):
     links: Sequence[str] | None = None
     warmup: Sequence[float] | None = None
 
-    name = 'thermal_growth'
     traits = Traits(
         title='thermal growth',
         meaning='the links grow with temperature',
@@ -140,7 +139,6 @@ class LinkWarmUp(Effect):
     warming_time: Value = 60.0
     follows: Sequence[float] | None = None
 
-    name = 'link_warm_up'
     traits = Traits(
         title='warm-up of the link',
         meaning='one link grows as it warms up',

@@ -115,7 +115,6 @@ class TransmissionRipple(Effect):
     order: Value = 1.0
     phase: Value = 0.0
 
-    name = 'transmission_ripple'
     traits = Traits(
         title='transmission ripple',
         meaning='a gear turns unevenly, in waves over its turn',

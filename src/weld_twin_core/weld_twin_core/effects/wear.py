@@ -28,7 +28,6 @@ class Wear(Effect):
     rate: Value = 0.0
     slowing: Value = 0.0
 
-    name = 'wear'
     traits = Traits(
         title='tool wear',
         meaning='the tip of the tool wears away',

@@ -150,6 +150,21 @@ def test_stamps_that_increase_are_kept(tmp_path, ur5):
     assert "stamps in 'time' are in ms" in said
 
 
+@pytest.mark.parametrize(
+    ('name', 'step', 'days'), [('time', 30, 1), ('Datum', 300, 1), ('time', 300, 0)]
+)
+def test_dates_that_excel_counts_in_days_are_told_from_seconds(tmp_path, ur5, name, step, days):
+    """Half a minute would be a third of a millisecond; five minutes could be a fast clock's."""
+    q, T = poses(ur5)
+    serial = 45992.5 + step * np.arange(12) / 86400.0
+    path = table(tmp_path / 't.csv', [name, *JOINTS, 'x', 'y', 'z'], serial, q, T[:, :3, 3])
+    recording, _ = read_table(path, ur5)
+    scale = 1.0 if days else 1.0 / 86400.0
+    np.testing.assert_allclose(np.diff(recording.joints.t), step * scale, rtol=2e-3)
+    if days:
+        assert recording.epoch_ns == 1_764_590_400 * 1_000_000_000  # noon of 1 December 2025
+
+
 def test_rows_with_a_gap_are_left_out_and_counted(tmp_path, ur5):
     q, T = poses(ur5)
     path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])

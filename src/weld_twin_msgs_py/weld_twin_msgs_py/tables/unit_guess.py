@@ -83,6 +83,10 @@ _LARGEST = (('s', 1e11), ('ms', 1e14), ('us', 1e17), ('ns', np.inf))
 """Beyond these, stamps since 1970 must be in the next finer unit."""
 
 
+_SERIALS = (25_569.0, 73_051.0)
+"""Days from the end of 1899, as Excel counts dates, to 1970 and to 2100."""
+_FASTEST = 5e-4
+"""Step [s] that no controller and no tracker is below; as days it is 43 s."""
 _MOSTLY = 0.9
 """Share of the rows that are in order at least, for the others to be repeats and no other order."""
 _DATES = ('%d.%m.%Y', '%Y/%m/%d', '%d-%b-%Y', '%Y-%m-%d', '%m/%d/%Y', '%d/%m/%Y', '')
@@ -104,11 +108,28 @@ def stamps(
     values = _parsed(cells, column, date)
     if values is None:
         return None, f'stamps in {column!r} cannot be read; {order}'
-    if np.isnan(values).any() or (values.size > 1 and np.diff(values).min() <= 0.0):
-        return None, f'stamps in {column!r} do not increase from row to row; {order}'
+    steps = np.diff(values)
+    if not (steps > 0.0).all():  # an empty cell is in no order either
+        line = cells.lines[int(np.argmin(steps > 0.0)) + 1]
+        return None, (
+            f'stamps in {column!r} do not increase from row to row (line {line} is the first); where '
+            f'the rows are one motion, sort them by time first; {order}'
+        )
+    if unit is None and _is_serial(values, steps, column):
+        days = values - _SERIALS[0]
+        return days * 86_400.0, f'stamps in {column!r} are dates as Excel counts them, in days'
     chosen = unit or next(name for name, top in _LARGEST if abs(values).max() < top)
     scale = factor(_SECONDS, chosen, column, 'the time')
     return values * scale, f'stamps in {column!r} are in {chosen}'
+
+
+def _is_serial(values: Array, steps: Array, column: str) -> bool:
+    """Return whether stamps are dates in days: by their column's name, or no clock steps so little."""
+    first, last = _SERIALS
+    if not first <= values[0] <= values[-1] < last:
+        return False
+    named = any(word in column.lower() for word in ('date', 'datum'))
+    return named or bool(steps.size and np.median(steps) < _FASTEST)
 
 
 def later_rows(

@@ -90,8 +90,8 @@ class _Stations(NamedTuple):
                 inside = (at >= 0) & (at < every.size)
                 problem, motion = self._pairs(part[inside], at[inside])
                 shots.append(snapshot(problem, self.model, [motion]))
-        rough_models(shots, thorough=True)  # all at once
-        yield from (shot.framed for shot in shots)
+        rough = zip(rough_models(shots, thorough=True), shots, strict=True)  # all at once
+        yield from (shot.framed for model, shot in rough if shot.gap(model) < FAR)
 
     def _pairs(self, reading: Rows, station: Rows) -> tuple[Problem, Array]:
         seen = self.recording.seen

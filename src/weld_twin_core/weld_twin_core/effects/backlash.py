@@ -34,7 +34,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,6 +207,24 @@ class _LoadedSearch(SearchHooks):
             yield self.kind(str(joint), 0.0, friction)
 
 
+_BENDS = 7
+"""Torques at which a curve may bend, from the least to the most of its `shares`: 1.3 apart."""
+
+
+class _BentFit(FitHooks):
+    effect: _BentByLoad
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return curves that bend anywhere between the torques that a search starts from."""
+        torque = load(view, view.robot.index(self.effect.joint))
+        most = float(np.abs(torque).max(initial=0.0))
+        bends = (most * np.geomspace(*self.effect.shares, _BENDS)).tolist()
+        each = [replace(self.effect, torque=b) for b in bends if b and _changes(torque, b)]
+        if zoom or not each:
+            return None
+        return each, np.stack([curve.bent(torque) for curve in each])
+
+
 class _BentByLoad(LinearEffect):
     """What a joint does under its load torque, along a curve that bends at ``torque`` [N m]."""
 
@@ -217,8 +235,9 @@ class _BentByLoad(LinearEffect):
     stage = Stage.LINK
     options = ('torque',)
     needs = frozenset({'load'})
-    shares = (0.03, 0.15)
-    """Torques that a search starts from, in the largest load seen."""
+    fit = Hooked(_BentFit)
+    shares: ClassVar[tuple[float, float]] = (0.03, 0.15)
+    """Torques that a search starts from, in the largest load seen; a fit takes any between."""
 
     def check(self, robot: Robot) -> None:
         """Refuse a curve without a bend: it would jump."""

@@ -15,7 +15,7 @@ without what has a memory, and left where that gains too little as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -184,14 +184,34 @@ class _Work(NamedTuple):
                     motion = repeated(self.model.robot, moved, piece)
                 except PathError:
                     continue  # its seams are refused for it
-                gap = self.gap(piece, motion, calm)
-                _collect(self.model, moved, piece, motion, gap, steps)
+                for point, step in self._steps(moved, piece, motion, calm):
+                    steps.setdefault(point, []).append(step)
             points = list(moved.points)
             for point, result in steps.items():
                 if point not in still:
                     points[point] = _stepped(points[point], np.mean(result, axis=0))
             moved = moved.with_points(points)
         return moved if self.written is None else moved.with_points(self.written(moved.points))
+
+    def _steps(
+        self, moved: MoveProgram, piece: Piece, motion: JointMotion, calm: Collection[int]
+    ) -> Iterator[tuple[int, Array]]:
+        """Yield each point that is used and what that use misses, in the point's own coordinates."""
+        gap = self.gap(piece, motion, calm)
+        for k, move in enumerate(piece.moves):
+            for use, at in ((move.via, piece.vias[k]), (move.end, piece.ends[k])):
+                if use is None or not use.leads:
+                    continue
+                point = moved.points[use.point]
+                if point.ndim == 1:
+                    arm = self.model.arm(move.tool)
+                    jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
+                    step = np.zeros(arm.n)  # external axes go where they went
+                    own = slice(moved.external, None)
+                    step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
+                else:
+                    step = _own(moved.place(use), use, point, gap[at])
+                yield use.point, step
 
     def refused(
         self, moved: MoveProgram, remaining: dict[int, str], calm: Collection[int]
@@ -367,31 +387,6 @@ def _worse(before: float, after: float) -> str:
         f'its worst place would be {after * 1e3:.3f} mm off instead of {before * 1e3:.3f} mm; too '
         'little is gained there, as where play turns around or lag sets in between two points'
     )
-
-
-def _collect(
-    model: ProgramModel,
-    moved: MoveProgram,
-    piece: Piece,
-    motion: JointMotion,
-    gap: Array,
-    steps: dict[int, list[Array]],
-) -> None:
-    """Add what each use of a point misses, in the point's own coordinates."""
-    for k, move in enumerate(piece.moves):
-        for use, at in ((move.via, piece.vias[k]), (move.end, piece.ends[k])):
-            if use is None or not use.leads:
-                continue
-            point = moved.points[use.point]
-            if point.ndim == 1:
-                arm = model.arm(move.tool)
-                jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
-                step = np.zeros(arm.n)  # external axes go where they went
-                own = slice(moved.external, None)
-                step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
-            else:
-                step = _own(moved.place(use), use, point, gap[at])
-            steps.setdefault(use.point, []).append(step)
 
 
 def _own(place: Array, use: Use, point: Array, gap: Array) -> Array:

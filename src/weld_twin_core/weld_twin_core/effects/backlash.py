@@ -212,7 +212,7 @@ _BENDS = 7
 
 
 class _BentFit(FitHooks):
-    effect: _BentByLoad
+    effect: LoadedPlay | Stiffening
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
         """Return curves that bend anywhere between the torques that a search starts from."""

@@ -73,13 +73,16 @@ def refuse_mended(content: Mapping[str, Any], path: Path | str) -> None:
 def by_effort(path: Path | str) -> bool:
     """Return whether springs of a model file take the measured efforts of the joints."""
     content = diagnosis_of(path)
-    model = content.get('model') or {}
-    entries = [*model.get('known', ()), *model.get('found', ())]
-    if not content:
-        entries = read_yaml(path, 'effects file') or []
+    entries = entries_of(content) if content else read_yaml(path, 'effects file') or []
     return any(
         isinstance(entry, dict) and entry.get('statics') in LOAD_OF_EFFORT for entry in entries
     )
+
+
+def entries_of(content: Mapping[str, Any]) -> list[Any]:
+    """Return what the model of a diagnosis knew and found, as entries of an effects file."""
+    model = content.get('model') or {}
+    return [*model.get('known', ()), *model.get('found', ())]
 
 
 def other_readings(content: Mapping[str, Any]) -> str:

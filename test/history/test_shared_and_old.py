@@ -166,6 +166,7 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
     monkeypatch.setattr('weld_twin_report.history.database.PATIENCE', 20.0)
     said = weld_twin(*words, '--again')
     assert (said.code, said.out) == (0, f'{file}: 1 done\n')
+    assert said.err.count('waiting up to 20 s') == 1 and 'locked' in said.err
     assert states(db) == ['done']
 
 

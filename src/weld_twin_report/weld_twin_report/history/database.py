@@ -9,6 +9,7 @@ Arrays are kept as bytes of little-endian doubles, packed: a history of 10,000 d
 
 from __future__ import annotations
 
+import sys
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -189,9 +190,11 @@ class Database:
         Do some work in one transaction, and return what it returns.
 
         It is done again while others hold the database, or its server is being restarted; so it
-        must change nothing but the database. Raises Unavailable when patience [s] is over.
+        must change nothing but the database; that it waits is said once. Raises Unavailable when
+        patience [s] is over.
         """
-        remaining = waits(self._patience if patience is None else patience)
+        patience = self._patience if patience is None else patience
+        remaining, waiting = waits(patience), False
         while True:
             try:
                 with self._engine.connect() as plain:
@@ -203,6 +206,15 @@ class Database:
                 if wait is None:
                     with self._clear():
                         raise
+                reason = str(getattr(error, 'orig', error)).strip()
+            if not waiting:
+                print(
+                    f"weld-twin: waiting up to {patience:.0f} s for the history '{self.url}', which "
+                    f'cannot be written now: {reason}',
+                    file=sys.stderr,
+                    flush=True,
+                )
+            waiting = True
             time.sleep(wait)
 
     @contextmanager

@@ -74,3 +74,19 @@ def test_a_joint_at_rest_in_the_first_recording_hides_no_stairs_of_the_second():
         ('quantization', 'elbow_joint')
     ]
     assert found.effects[0].effect.step == pytest.approx(1.3e-3, rel=1e-3)
+
+
+def test_wide_play_that_the_load_moves_leaves_no_curve_for_springs_of_its_joint():
+    robot, rng = load('ur5'), np.random.default_rng(5)
+    low, high = [-2.0, -2.4, -1.8, -2.5, -2.2, -3.0], [2.0, -0.7, 1.8, -0.5, 2.2, 3.0]
+    q = rng.uniform(low, high, (60, 6))
+    stations = Recording('stations', JointMotion(np.arange(60.0), q, static=True))
+    # the shoulder bears 42 N m at most; a search starts from 1.3 and from 6.3
+    play = effect('loaded_play', joint='shoulder_lift_joint', width=2.2e-3, torque=2.9)
+    seen = Twin(robot, [play]).poses(stations).position
+    seen = seen + rng.normal(scale=2e-5, size=seen.shape)
+    springs = all_but('loaded_play', 'stiffening', 'joint_compliance', 'joint_offset')
+    measured = stations.with_measured(Measurements(stations.joints.t, seen))
+    (found,) = diagnose(measured, robot, exclude=springs, experiment=False).effects
+    assert found.effect.site == 'shoulder_lift_joint'
+    assert found.effect.width == pytest.approx(2.2e-3, rel=0.01)

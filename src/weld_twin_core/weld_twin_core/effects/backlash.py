@@ -216,12 +216,10 @@ class _BentFit(FitHooks):
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
         """Return curves that bend anywhere between the torques that a search starts from."""
-        torque = load(view, view.robot.index(self.effect.joint))
-        most = float(np.abs(torque).max(initial=0.0))
-        bends = (most * np.geomspace(*self.effect.shares, _BENDS)).tolist()
-        each = [replace(self.effect, torque=b) for b in bends if b and _changes(torque, b)]
-        if zoom or not each:
+        each = [] if zoom else self.effect._curves(view, self.effect.joint, _BENDS)
+        if not each:
             return None
+        torque = load(view, view.robot.index(self.effect.joint))
         return each, np.stack([curve.bent(torque) for curve in each])
 
 
@@ -257,13 +255,16 @@ class _BentByLoad(LinearEffect):
     def seeds(
         cls: type[Any], view: View, joint: str | None, pull: Array | None = None
     ) -> Iterable[Effect]:
-        """Yield curves that bend under a small load and under a larger one."""
-        torque = load(view, view.robot.index(str(joint)))
-        most = float(np.abs(torque).max(initial=0.0))
-        for share in cls.shares:
-            # Where the load stays on one side, so does the flank, and that is an offset.
-            if most > 0.0 and _changes(torque, share * most):
-                yield cls(str(joint), 0.0, share * most)
+        """Return curves that bend under a small load and under a larger one."""
+        return list(cls._curves(view, str(joint), 2))
+
+    @classmethod
+    def _curves(cls: type[Any], view: View, joint: str, count: int) -> list[Any]:
+        """Return curves of no size that bend at torques from the least to the most of `shares`."""
+        torque, (least, most) = load(view, view.robot.index(joint)), cls.shares
+        bends = np.abs(torque).max(initial=0.0) * np.geomspace(least, most, count)
+        # Where the load stays on one side, so does the flank, and that is an offset.
+        return [cls(joint, 0.0, b) for b in bends.tolist() if b > 0.0 and _changes(torque, b)]
 
 
 @register

@@ -3,6 +3,7 @@
 """A history that many write to, that an older version made, that is damaged, or is none."""
 
 import json
+import logging
 import multiprocessing
 import shutil
 import sqlite3
@@ -164,6 +165,7 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
     assert 'not written; run it again' in said.err and 'locked' in said.err
     assert states(db) == []
     monkeypatch.setattr('weld_twin_report.history.database.PATIENCE', 20.0)
+    monkeypatch.setattr(logging.root, 'handlers', [])  # the command has none, pytest has some
     said = weld_twin(*words, '--again')
     assert (said.code, said.out) == (0, f'{file}: 1 done\n')
     assert said.err.count('waiting up to 20 s') == 1 and 'locked' in said.err

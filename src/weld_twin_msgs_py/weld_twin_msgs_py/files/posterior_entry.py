@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The entry ``posterior`` of a diagnosis file: how sure its model is of a pose."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,17 @@ from weld_twin_core.twin.domain import Domain, Spots
 from weld_twin_core.twin.posterior import Posterior
 
 from .diagnosis_model import read_diagnosis
+from .whole_files import plain
+
+SEAL = 'sha256'
+"""Key for the digest of all else in the entry; older files have none."""
+
+
+def sealed(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry with the digest by which it is known that nobody changed it."""
+    rest = {key: value for key, value in entry.items() if key != SEAL}
+    text = json.dumps(plain(rest), sort_keys=True)
+    return {**rest, SEAL: hashlib.sha256(text.encode()).hexdigest()}
 
 
 def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
@@ -25,11 +38,17 @@ def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
     if entry is None:
         return None
     try:
-        return _posterior(robot, entry)
+        posterior = _posterior(robot, entry)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"the posterior of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
         raise ModelError(f"diagnosis '{path}': {error}") from None
+    if SEAL in entry and sealed(entry) != entry:
+        raise ModelError(
+            f"the posterior of diagnosis '{path}' was changed after it was written, and nothing says "
+            'any more how sure a pose is; take the file as diagnose wrote it'
+        )
+    return posterior
 
 
 def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:

@@ -360,6 +360,8 @@ def test_a_model_written_without_a_posterior_still_predicts_and_says_so(cell, fo
         (lambda p: p['covariance'].pop(), 'lower triangle'),
         (lambda p: p['recorded']['joints'].reverse(), 'it was made for joints'),
         (lambda p: p['discrepancy'].update(position_m=-1.0), 'must be a size'),
+        (lambda p: p['discrepancy'].update(position_m=0.0), 'was changed after it was written'),
+        (lambda p: p['recorded']['joints'][0]['measured'].pop(), 'was changed after'),
     ],
 )
 def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):

@@ -9,7 +9,7 @@ Arrays are kept as bytes of little-endian doubles, packed: a history of 10,000 d
 
 from __future__ import annotations
 
-import sys
+import logging
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -49,6 +49,8 @@ PATIENCE = 60.0
 DAMAGED = (zlib.error, ValueError, TypeError, KeyError, AttributeError)
 """What reading a row raises that somebody or something has changed."""
 T = TypeVar('T')
+_LOGGER = logging.getLogger(__name__)
+"""A program that sets up no handler, as the commands do not, has its warnings on stderr."""
 
 
 class Refused(DataError):
@@ -208,11 +210,11 @@ class Database:
                         raise
                 reason = str(getattr(error, 'orig', error)).strip()
             if not waiting:
-                print(
-                    f"weld-twin: waiting up to {patience:.0f} s for the history '{self.url}', which "
-                    f'cannot be written now: {reason}',
-                    file=sys.stderr,
-                    flush=True,
+                _LOGGER.warning(
+                    "waiting up to %.0f s for the history '%s', which cannot be written now: %s",
+                    patience,
+                    self.url,
+                    reason,
                 )
             waiting = True
             time.sleep(wait)

@@ -15,6 +15,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
+from weld_twin_msgs_py.files.posterior_entry import sealed
 from weld_twin_msgs_py.files.whole_files import json_text, write_text
 from weld_twin_msgs_py.robots.urdf_write import GivenUrdf
 from weld_twin_nodes.offline.exports import where_it_holds, write_all
@@ -104,6 +105,8 @@ def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
     content = diagnosis.as_dict()
     if content['candidates'] is not None:
         content['candidates'] = _candidates(diagnosis, content['candidates'])
+    if content['posterior'] is not None:
+        content['posterior'] = sealed(content['posterior'])
     content['inputs'] = [item.as_dict() for item in inputs]
     content['version'] = __version__
     return json_text(content)

@@ -7,6 +7,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.bursts import ONE_CLOCK
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagWriter, bag_info, read_recording, write_recording
@@ -104,6 +105,47 @@ def test_what_info_and_a_diagnosis_say_of_lacking_measurements_is_the_same(tmp_p
     with pytest.raises(DataError) as error:
         read_recording(tmp_path / 'bag', robot, needs_measurements=True)
     assert str(error.value).endswith(missing)
+
+
+NAN = np.nan
+
+
+@pytest.mark.parametrize(
+    ('pose', 'angle', 'gripper', 'robot', 'reason'),
+    [
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 0.0], 0.0, 0.0, None, 'orientation'),
+        ([0.1, 0.2, 0.3, NAN, NAN, NAN, NAN], 0.0, 0.0, None, 'orientation'),
+        ([NAN, NAN, NAN, 0.0, 0.0, 0.0, 1.0], 0.0, 0.0, None, 'position'),
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0], NAN, NAN, None, 'joint_states'),
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0], 0.0, NAN, None, ''),
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0], NAN, NAN, {'joints': [{'name': 'a'}]}, "'a'"),
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0], 0.0, NAN, {'joints': [{'name': 'a'}]}, ''),
+        ([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0], 0.0, 0.0, {'joints': 7}, ''),
+    ],
+)
+def test_a_bag_of_which_a_diagnosis_can_take_nothing_is_not_called_usable(
+    tmp_path, pose, angle, gripper, robot, reason
+):
+    make, made = bag_messages(), {} if robot is None else {'robot': robot}
+    with BagWriter(tmp_path / 'bag', provenance=made) as bag:
+        for k in range(1, 6):
+            q = [0.1 * k + angle, gripper]
+            bag.write('/joint_states', make.joint_state(k * SECOND, ['a', 'gripper'], q), k)
+            seen = make.pose(k * SECOND, np.zeros(3), np.eye(3))
+            inner = seen.pose
+            (inner.position.x, inner.position.y, inner.position.z) = pose[:3]
+            turn = inner.orientation
+            (turn.x, turn.y, turn.z, turn.w) = pose[3:]
+            bag.write('/measured/tool_pose', seen, k)
+    info = bag_info(tmp_path / 'bag')
+    assert info.usable == (not reason) and reason in info.refused
+    arm = Robot.from_mapping({'joints': [{'name': 'a'}]})
+    if reason:
+        with pytest.raises(DataError) as error:
+            read_recording(tmp_path / 'bag', arm)
+        assert str(error.value) == info.refused
+    else:
+        assert read_recording(tmp_path / 'bag', arm).measured is not None
 
 
 def test_an_empty_bag_is_described_not_refused(tmp_path):

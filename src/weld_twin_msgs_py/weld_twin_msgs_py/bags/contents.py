@@ -5,18 +5,26 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.bursts import ONE_CLOCK, Bursts, apart, bursts
+from weld_twin_core.errors import DataError, TwinError
 
-from ..assembly.foreign_types import split_topic
+from ..assembly.foreign_types import plain_messages, split_topic
 from ..messages.topics import BY_NAME, CONTACT, TopicNames
+from .from_bag import read_recording
 from .needed import GAP, TYPES, Ends, never_recorded, no_joints, no_measurements, uneven_ends
 from .reader import BagReader
+
+NAMED = 100
+"""Joint states in which the joints of an unknown robot are looked for: of every publisher some."""
 
 
 @dataclass(frozen=True)
@@ -54,16 +62,19 @@ class BagInfo:
     provenance: dict[str, Any]
     incomplete: tuple[str, ...] = ()
     """What of the messages sent is not in it, and which streams begin late or end early."""
+    refused: str = ''  # why a diagnosis cannot take what is there
 
     @property
     def usable(self) -> bool:
-        """Return whether nothing is missing, so that a diagnosis can start from it."""
-        return not self.missing
+        """Return whether a diagnosis can start from it."""
+        return not (self.missing or self.refused)
 
 
 def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
     """
-    Look through a bag; every message is touched, none is decoded.
+    Look through a bag, and read it as a diagnosis does.
+
+    Its robot is the one it says it was made with, else any of the joints that it tells.
 
     Raises
     ------
@@ -88,7 +99,38 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
         (*lacking, *notes),
         made,
         lacking,
+        '' if missing else _refusal(path, names, made),
     )
+
+
+def _refusal(path: Path | str, names: TopicNames, made: Mapping[str, Any]) -> str:
+    """Return why a diagnosis refuses what is in a bag; empty where it takes it."""
+    try:
+        try:
+            robot = Robot.from_mapping(made['robot'])
+        except (KeyError, TwinError):
+            robot = _robot_of(path, split_topic(names.joints))
+            names = replace(names, joint_prefix='', joint_map=())
+        read_recording(path, robot, names, needs_measurements=True)
+    except TwinError as error:
+        return str(error)
+    return ''
+
+
+def _robot_of(path: Path | str, source: tuple[str, str]) -> Robot:
+    """Return a robot of the joints that the widest joint state tells, but those it has no number of."""
+    topic, part = source
+    widest: Any = None
+    with BagReader(path) as bag:
+        for _, kind, _, message in islice(bag.messages([topic]), NAMED):
+            for each in plain_messages(kind, message, part):
+                if widest is None or len(each.name) > len(widest.name):
+                    widest = each
+    if widest is None or not widest.name:
+        raise DataError(f"the joint states of '{topic}' name no joint")
+    told = [n for n, at in zip(widest.name, widest.position, strict=False) if np.isfinite(at)]
+    joints = [{'name': name} for name in told or widest.name]
+    return Robot.from_mapping({'name': 'of the bag', 'joints': joints})
 
 
 def _topics_of(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[str, Any]]:

@@ -49,6 +49,7 @@ def _sentences(result: BagInfo) -> list[str]:
     from weld_twin_msgs_py.bags.needed import COMPLETENESS
 
     out = [f'missing: {text}' for text in result.missing]
+    out += [f'refused: {result.refused}'] if result.refused else []
     out += [f'note: {text}' for text in result.notes]
     for key, value in result.provenance.items():
         if key != COMPLETENESS:

@@ -11,18 +11,12 @@ from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recordin
 from weld_twin_msgs_py.bags.from_bag import Stream, fill_regular
 from weld_twin_msgs_py.messages.topics import TopicNames
 
-STORAGES = ('mcap', 'sqlite3')
 ROLES = {
     TopicNames().joints: Role.JOINTS,
     TopicNames().pose: Role.POSE,
     TopicNames().wrench: Role.WRENCH,
     TopicNames().temperature: Role.TEMPERATURE,
 }
-
-
-@pytest.fixture(params=STORAGES)
-def storage(request):
-    return request.param
 
 
 @pytest.fixture
@@ -33,7 +27,7 @@ def messages(tmp_path, recording, robot):
         return list(bag.raw(bag.topics))[:100]
 
 
-def write(path, messages, storage):
+def write(path, messages, storage='mcap'):
     with BagWriter(path, storage=storage) as bag:
         for topic, kind, log_ns, data in messages:
             bag.write_cdr(topic, kind, bytes(data), log_ns)
@@ -48,12 +42,8 @@ def everything(path, robot):
         return str(error)
     arrays = [got.joints.t, got.joints.q, got.joints.qd]
     if got.measured is not None:
-        arrays += [
-            got.measured.t,
-            got.measured.position,
-            got.measured.rotation,
-            got.measured.sigma,
-        ]
+        seen = got.measured
+        arrays += [seen.t, seen.position, seen.rotation, seen.sigma]
     for signal in (got.wrench, got.temperature):
         arrays += [] if signal is None else [signal.t, signal.value]
     numbers = [None if each is None else each.tobytes() for each in arrays]
@@ -72,6 +62,7 @@ def one_by_one(path, robot, monkeypatch):
         return everything(path, robot)
 
 
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_the_usual_bag_is_read_at_once_and_alike(tmp_path, robot, messages, storage, monkeypatch):
     bag = write(tmp_path / 'bag', messages, storage)
     assert at_once(bag, robot)
@@ -110,35 +101,25 @@ def _longer(data, rng):
     data += bytes(int(rng.integers(1, 9)))
 
 
-CHANGES = (
-    _flip,
-    _not_a_number,
-    _unset_stamp,
-    _stamp_of_another_time,
-    _big_endian,
-    _rubbish_in_padding,
-    _shorter,
-    _longer,
-)
+CHANGES = (_flip, _not_a_number, _unset_stamp, _stamp_of_another_time)
+CHANGES += (_big_endian, _rubbish_in_padding, _shorter, _longer)
 
 
 @pytest.mark.parametrize('seed', range(2))
 @pytest.mark.parametrize('change', CHANGES)
 def test_changed_messages_give_the_same_samples_or_the_same_refusal(
-    tmp_path, robot, messages, storage, monkeypatch, change, seed
+    tmp_path, robot, messages, monkeypatch, change, seed
 ):
     rng = np.random.default_rng(seed)
     changed = [(topic, kind, ns, bytearray(data)) for topic, kind, ns, data in messages]
     for _ in range(rng.integers(1, 4)):
         change(changed[rng.integers(len(changed))][3], rng)
-    bag = write(tmp_path / 'bag', changed, storage)
+    bag = write(tmp_path / 'bag', changed)
     assert everything(bag, robot) == one_by_one(bag, robot, monkeypatch)
 
 
 @pytest.mark.parametrize('seed', range(2))
-def test_messages_in_another_order_are_read_alike(
-    tmp_path, robot, messages, storage, monkeypatch, seed
-):
+def test_messages_in_another_order_are_read_alike(tmp_path, robot, messages, monkeypatch, seed):
     """Recorded late, twice, or not at all: each topic then has gaps, repeats or steps back."""
     rng = np.random.default_rng(seed)
     order = np.arange(len(messages))
@@ -148,10 +129,11 @@ def test_messages_in_another_order_are_read_alike(
     shuffled = [(*messages[k][:2], ns, messages[k][3]) for k, ns in zip(order, times, strict=True)]
     del shuffled[int(rng.integers(len(shuffled)))]
     shuffled.insert(int(first) // 2, shuffled[int(first) // 2])
-    bag = write(tmp_path / 'bag', shuffled, storage)
+    bag = write(tmp_path / 'bag', shuffled)
     assert everything(bag, robot) == one_by_one(bag, robot, monkeypatch)
 
 
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_damaged_files_are_read_alike(tmp_path, robot, messages, storage, monkeypatch):
     bag = write(tmp_path / 'bag', messages, storage)
     file = next(path for path in bag.iterdir() if path.suffix != '.yaml')

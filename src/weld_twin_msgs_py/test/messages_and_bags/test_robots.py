@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_pinocchio import by_pinocchio
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
@@ -33,36 +34,6 @@ ROBOTS = [
 ]
 
 
-class Reference:
-    """Pinocchio's view of the same URDF."""
-
-    def __init__(self, path, base, tip, joint_names):
-        self.pin = pytest.importorskip('pinocchio')
-        self.model = self.pin.buildModelFromUrdf(str(path))
-        self.data = self.model.createData()
-        self.base = self.model.getFrameId(base) if base else 0
-        self.tip = self.model.getFrameId(tip)
-        self.joints = [self.model.joints[self.model.getJointId(name)] for name in joint_names]
-
-    def configuration(self, q):
-        full = self.pin.neutral(self.model)
-        for joint, value in zip(self.joints, q, strict=True):
-            turns = joint.nq == 2  # a continuous joint is held as cosine and sine
-            full[joint.idx_q : joint.idx_q + joint.nq] = (
-                (np.cos(value), np.sin(value)) if turns else value
-            )
-        return full
-
-    def pose(self, q):
-        self.pin.framesForwardKinematics(self.model, self.data, self.configuration(q))
-        return (self.data.oMf[self.base].inverse() * self.data.oMf[self.tip]).homogeneous
-
-    def gravity(self, q, gravity):
-        self.model.gravity.linear = gravity
-        torque = self.pin.computeGeneralizedGravity(self.model, self.data, self.configuration(q))
-        return np.array([torque[joint.idx_v] for joint in self.joints])
-
-
 @pytest.fixture(params=ROBOTS, ids=lambda case: f'{Path(case[0]).stem}-{case[2]}')
 def case(request):
     name, base, tip = request.param
@@ -71,30 +42,23 @@ def case(request):
     except PackageNotFoundError:
         pytest.skip('example-robot-data is not installed')
     path = next(file.locate() for file in shared if str(file).endswith(f'/robots/{name}'))
-    robot = read_urdf(path, base, tip)
-    return robot, Reference(path, base, tip, robot.joint_names)
+    return read_urdf(path, base, tip), path, base, tip
 
 
 def random_positions(robot, count=40):
     return np.random.default_rng(11).uniform(-3.0, 3.0, (count, robot.n))
 
 
-def test_a_urdf_gives_the_poses_pinocchio_gives(case):
-    robot, reference = case
+def test_a_urdf_gives_the_poses_and_gravity_torques_pinocchio_gives(case):
+    robot, path, base, tip = case
     q = random_positions(robot)
-    expected = np.array([reference.pose(row) for row in q])
-    np.testing.assert_allclose(forward(robot, q), expected, rtol=0.0, atol=1e-12)
-
-
-def test_a_urdf_gives_the_gravity_torques_pinocchio_gives(case):
-    robot, reference = case
-    q = random_positions(robot)
-    held = np.array([reference.gravity(row, np.array([0.0, 0.0, -9.80665])) for row in q])
-    np.testing.assert_allclose(gravity_torque(robot, q), -held, rtol=0.0, atol=1e-10)
+    poses, torques = by_pinocchio(path, robot.joint_names, q, base, tip)
+    np.testing.assert_allclose(forward(robot, q), poses, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(gravity_torque(robot, q), torques, rtol=0.0, atol=1e-10)
 
 
 def test_a_urdf_written_and_read_again_has_the_same_poses(case, tmp_path):
-    robot, _ = case
+    robot = case[0]
     write_urdf(tmp_path / 'again.urdf', robot)
     again = load_robot(str(tmp_path / 'again.urdf'))
     q = random_positions(robot)
@@ -114,9 +78,8 @@ def test_pinocchio_reads_our_urdf_of_a_bundled_robot_with_its_gear_errors(name, 
     }
     robot = Robot(**{**nominal.__dict__, **shifts})
     write_urdf(tmp_path / 'r.urdf', robot)
-    reference = Reference(tmp_path / 'r.urdf', 'world', 'tool', robot.joint_names)
     q = random_positions(robot)
-    expected = np.array([reference.pose(row) for row in q])
+    expected, _ = by_pinocchio(tmp_path / 'r.urdf', robot.joint_names, q, 'world', 'tool')
     np.testing.assert_allclose(forward(robot, q), expected, rtol=0.0, atol=1e-12)
 
 

@@ -30,40 +30,25 @@ def test_names_given_without_a_slash_get_one():
     assert TopicNames(joints='cell/joints').joints == '/cell/joints'
 
 
-@pytest.mark.parametrize('name', [topic.name for topic in TOPICS])
-def test_our_subscribers_receive_from_our_publishers(name):
+@pytest.mark.parametrize('name', BY_NAME)
+def test_who_sends_and_who_hears_match_whoever_made_them(name):
+    """Drivers of sensors send best effort, controllers reliably; so do others ask for ours."""
     qos = pytest.importorskip('rclpy.qos')
-    topic = BY_NAME[name]
-    offered, requested = topic.offered.to_rclpy(), topic.requested.to_rclpy()
-    verdict, reason = qos.qos_check_compatible(offered, requested)
-    assert verdict == qos.QoSCompatibility.OK, reason
-
-
-def _foreign(qos, reliability):
-    return qos.QoSProfile(
-        depth=5,
-        reliability=reliability,
-        durability=qos.DurabilityPolicy.VOLATILE,
-        liveliness=qos.LivelinessPolicy.AUTOMATIC,
-    )
-
-
-@pytest.mark.parametrize('name', INPUTS)
-@pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
-def test_inputs_are_received_from_controllers_and_from_sensor_drivers(name, reliability):
-    qos = pytest.importorskip('rclpy.qos')
-    offered = _foreign(qos, qos.ReliabilityPolicy[reliability])
-    verdict, reason = qos.qos_check_compatible(offered, BY_NAME[name].requested.to_rclpy())
-    assert verdict == qos.QoSCompatibility.OK, reason
-
-
-@pytest.mark.parametrize('name', [topic.name for topic in TOPICS])
-@pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
-def test_our_publishers_serve_reliable_and_best_effort_subscribers(name, reliability):
-    qos = pytest.importorskip('rclpy.qos')
-    requested = _foreign(qos, qos.ReliabilityPolicy[reliability])
-    verdict, reason = qos.qos_check_compatible(BY_NAME[name].offered.to_rclpy(), requested)
-    assert verdict == qos.QoSCompatibility.OK, reason
+    theirs = [
+        qos.QoSProfile(
+            depth=5,
+            reliability=reliability,
+            durability=qos.DurabilityPolicy.VOLATILE,
+            liveliness=qos.LivelinessPolicy.AUTOMATIC,
+        )
+        for reliability in (qos.ReliabilityPolicy.RELIABLE, qos.ReliabilityPolicy.BEST_EFFORT)
+    ]
+    offered, asked = BY_NAME[name].offered.to_rclpy(), BY_NAME[name].requested.to_rclpy()
+    pairs = [(offered, asked), *((offered, other) for other in theirs)]
+    pairs += [(other, asked) for other in theirs if name in INPUTS]
+    for pair in pairs:
+        verdict, reason = qos.qos_check_compatible(*pair)
+        assert verdict == qos.QoSCompatibility.OK, reason
 
 
 def test_message_classes_are_those_of_the_table():

@@ -9,7 +9,7 @@ import tracemalloc
 import pytest
 import yaml
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BackgroundBag, BagReader, GrowingBag, bag_info
@@ -77,7 +77,7 @@ def rosbag2_bag(tmp_path, storage, numbered, mode):
     for part in range(2):
         writer = Writer(tmp_path / f'bag_{part}', version=8, storage_plugin=plugin)
         if mode is not None:
-            writer.set_compression(mode, writer_format())
+            writer.set_compression(mode, CompressionFormat.ZSTD)
         with writer as bag:
             topic, kind, _, _ = numbered(0)
             connection = bag.add_connection(topic, kind, typestore=TYPES)
@@ -96,19 +96,7 @@ def rosbag2_bag(tmp_path, storage, numbered, mode):
     (tmp_path / 'bag' / 'metadata.yaml').write_text(text)
 
 
-def writer_format():
-    from rosbags.rosbag2 import CompressionFormat
-
-    return CompressionFormat.ZSTD
-
-
-def modes():
-    from rosbags.rosbag2 import CompressionMode
-
-    return [None, CompressionMode.FILE, CompressionMode.MESSAGE]
-
-
-@pytest.mark.parametrize('mode', modes())
+@pytest.mark.parametrize('mode', [None, CompressionMode.FILE, CompressionMode.MESSAGE])
 def test_split_bags_of_rosbag2_read_compressed_or_not(tmp_path, storage, numbered, numbers, mode):
     rosbag2_bag(tmp_path, storage, numbered, mode)
     assert numbers(tmp_path / 'bag') == list(range(100))

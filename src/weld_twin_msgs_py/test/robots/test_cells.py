@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from by_pinocchio import by_pinocchio
 
 import weld_twin_core as wt
 from weld_twin_core.errors import ModelError
@@ -25,6 +26,7 @@ BRANCHES = (
     ('turn', 'continuous', 'cradle', 'plate', '0.1 0 -0.15', '0.2 0 0', '0 0 -1'),
     ('nest', 'fixed', 'plate', 'table', '0.1 0.05 0.08', '0 0 0.7', ''),
 )
+SHAPE = '<visual><geometry><mesh filename="a.stl"/></geometry></visual>'
 MASSES = {'carriage': 300.0, 'l1': 60.0, 'l2': 40.0, 'torch': 5.0, 'cradle': 120.0, 'plate': 50.0}
 
 
@@ -34,7 +36,8 @@ def cell_urdf(path, branches=BRANCHES):
         mass = MASSES.get(link)
         inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
         body = f'<origin xyz="0.1 -0.05 0.1"/><mass value="{mass}"/>{inertia}'
-        out.append(f'<link name="{link}">{f"<inertial>{body}</inertial>" if mass else ""}</link>')
+        weight = f'<inertial>{body}</inertial>' if mass else ''
+        out.append(f'<link name="{link}">{weight}{SHAPE}</link>')
     for name, kind, parent, child, xyz, rpy, axis in branches:
         limit = '<limit lower="-3" upper="2.5" velocity="1" effort="1"/>'
         moving = f'<axis xyz="{axis}"/>{limit}' if axis else ''
@@ -53,26 +56,6 @@ def given(tmp_path):
 
 def postures(robot):
     return np.random.default_rng(5).uniform(-1.4, 1.4, (8, robot.n))
-
-
-def by_pinocchio(path, names, q, base, tip):
-    """Return the tip in the base, and what gravity does to the joints, of another library."""
-    pin = pytest.importorskip('pinocchio')
-    model = pin.buildModelFromUrdf(str(path))
-    model.gravity.linear = np.array([0.0, 0.0, -9.80665])
-    data, poses, torques = model.createData(), [], []
-    for row in q:
-        there = pin.neutral(model)
-        for name, value in zip(names, row, strict=True):
-            joint = model.joints[model.getJointId(name)]
-            at = [np.cos(value), np.sin(value)] if joint.nq == 2 else [value]
-            there[joint.idx_q : joint.idx_q + joint.nq] = at
-        pin.framesForwardKinematics(model, data, there)
-        frames = (data.oMf[model.getFrameId(link)] for link in (base, tip))
-        poses.append(next(frames).actInv(next(frames)).homogeneous)
-        weights = -pin.computeGeneralizedGravity(model, data, there)
-        torques.append([weights[model.joints[model.getJointId(name)].idx_v] for name in names])
-    return np.array(poses), np.array(torques)
 
 
 @pytest.mark.parametrize(
@@ -105,6 +88,7 @@ def test_a_corrected_cell_keeps_its_names_and_the_sign_of_every_joint(given, tmp
     assert left == ()
     written = tmp_path / 'robot.urdf'
     write_urdf_like(written, GivenUrdf(given, 'table', 'torch'), better)
+    assert written.read_text().count('a.stl') == given.read_text().count('a.stl')
     q = postures(robot)
     np.testing.assert_allclose(
         by_pinocchio(written, robot.joint_names, q, 'table', 'torch')[0],

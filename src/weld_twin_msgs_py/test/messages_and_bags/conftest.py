@@ -1,18 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-
-
-@pytest.fixture
-def data():
-    return Path(__file__).parent / 'data'
 
 
 @pytest.fixture

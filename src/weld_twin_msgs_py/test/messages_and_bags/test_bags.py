@@ -67,7 +67,8 @@ def test_a_recording_survives_the_bag_its_single_file_and_the_loss_of_metadata(
     tmp_path, robot, recording, storage
 ):
     bag = tmp_path / 'mine.bag'  # as a directory may be called
-    write_recording(bag, recording, robot, storage=storage)
+    made = {'seed': 7, 'effects': [{'effect': 'backlash', 'joint': 'elbow', 'width': 5e-4}]}
+    write_recording(bag, recording, robot, storage=storage, provenance=made)
     back = read_recording(bag, robot)
     assert_same(back, recording)
     assert (back.name, back.notes) == ('mine.bag', ())
@@ -75,6 +76,7 @@ def test_a_recording_survives_the_bag_its_single_file_and_the_loss_of_metadata(
     assert f"of robot '{robot.name}', and 'other' was given" in note
     (file,) = (path for path in bag.iterdir() if path.suffix != '.yaml')
     told = provenance(bag)
+    assert told.items() >= {**made, 'robot': robot.to_mapping(), 'static': False}.items()
     alone = shutil.copy(file, tmp_path / f'alone{file.suffix}')
     write_recording(tmp_path / 'another', recording, robot, provenance={'static': None})
     beside = shutil.copy(file, tmp_path / 'another' / f'beside{file.suffix}')
@@ -170,16 +172,6 @@ def test_results_are_written_beside_the_inputs(tmp_path, robot, recording):
         assert bag.topics['/twin/tool_pose'] == ('geometry_msgs/msg/PoseStamped', n)
     np.testing.assert_array_equal(deviations, m.position[:, 0] * 2.0)
     np.testing.assert_array_equal(actual, recording.joints.q[:, 1] + 1.0)
-
-
-def test_provenance_is_read_back(tmp_path, robot, recording, storage):
-    made = {'seed': 7, 'effects': [{'effect': 'backlash', 'joint': 'elbow', 'width': 5e-4}]}
-    write_recording(tmp_path / 'bag', recording, robot, storage=storage, provenance=made)
-    back = provenance(tmp_path / 'bag')
-    assert back['seed'] == 7
-    assert back['effects'] == made['effects']
-    assert back['robot'] == robot.to_mapping()
-    assert back['static'] is False
 
 
 # Writing -------------------------------------------------------------------------------------
@@ -287,8 +279,7 @@ def test_missing_joint_states_list_the_topics_there_are(tmp_path, robot):
 
 
 def test_a_topic_of_the_wrong_type_is_an_error(tmp_path, robot):
-    make = bag_messages()
-    wrong = make.point(SECOND, np.zeros(3))
+    wrong = bag_messages().point(SECOND, np.zeros(3))
     write_messages(tmp_path / 'bag', [*joint_states([SECOND]), ('/measured/tool_pose', wrong)])
     with pytest.raises(
         DataError,
@@ -394,11 +385,15 @@ def stations(spacing, seed=0):
     )
 
 
+def read_alone(tmp_path, recording, robot):
+    """Return what is read of a file of which its writer says nothing."""
+    write_recording(tmp_path / 'bag', recording, robot, provenance={'static': None})
+    return read_recording(shutil.move(tmp_path / 'bag/bag.mcap', tmp_path / 'alone.mcap'), robot)
+
+
 @pytest.mark.parametrize('spacing', [1.0, 60.0, 0.1])
 def test_one_joint_state_per_measurement_far_apart_is_static(tmp_path, robot, spacing):
-    write_recording(tmp_path / 'bag', stations(spacing), robot, provenance={'static': None})
-    shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
-    back = read_recording(tmp_path / 'alone.mcap', robot)
+    back = read_alone(tmp_path, stations(spacing), robot)
     assert back.joints.static
     assert back.notes == ('30 static stations: the motion between them is not known',)
 
@@ -407,9 +402,7 @@ def test_a_smooth_motion_measured_at_every_joint_state_is_not_static(tmp_path, r
     t = np.arange(200) * 0.01
     q = np.stack([np.sin(t), np.cos(t)], axis=1)
     motion = Recording('m', JointMotion(t, q), Measurements(t, np.ones((200, 3))))
-    write_recording(tmp_path / 'bag', motion, robot, provenance={'static': None})
-    shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
-    assert not read_recording(tmp_path / 'alone.mcap', robot).joints.static
+    assert not read_alone(tmp_path, motion, robot).joints.static
 
 
 @pytest.mark.parametrize('every', [1, 12, 150])
@@ -424,13 +417,11 @@ def test_joint_states_of_two_arms_in_turn_are_refused_and_a_garbled_one_is_not(
     other = np.concatenate([q, np.zeros((both.size - t.size, 2))])
     motion = JointMotion(both[order], other[order])
     mixed = Recording('mixed', motion, Measurements(t, np.ones((200, 3))))
-    write_recording(tmp_path / 'bag', mixed, robot, provenance={'static': None})
-    alone = shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
     if every == 150:
-        assert read_recording(alone, robot).joints.t.size == 201
+        assert read_alone(tmp_path, mixed, robot).joints.t.size == 201
     else:
         with pytest.raises(DataError, match='two publishers share'):
-            read_recording(alone, robot)
+            read_alone(tmp_path, mixed, robot)
 
 
 @pytest.mark.parametrize('lap', [2, 3])
@@ -439,9 +430,7 @@ def test_stations_with_home_between_them_are_no_two_arms(lap, tmp_path, robot):
     q = still.joints.q.copy()
     q[::lap] = 0.5
     home = replace(still, joints=JointMotion(still.joints.t, q))
-    write_recording(tmp_path / 'bag', home, robot, provenance={'static': None})
-    shutil.move(tmp_path / 'bag' / 'bag.mcap', tmp_path / 'alone.mcap')
-    assert read_recording(tmp_path / 'alone.mcap', robot).joints.static
+    assert read_alone(tmp_path, home, robot).joints.static
 
 
 def test_what_the_writer_knew_about_stations_is_believed(tmp_path, robot):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.bursts import ONE_CLOCK
 from weld_twin_core.errors import DataError
@@ -93,7 +92,7 @@ def test_clocks_without_overlap_are_told(tmp_path):
 
 @pytest.mark.parametrize('own', ['/twin/tool_pose', '/left/twin/tool_pose'])
 def test_what_info_and_a_diagnosis_say_of_lacking_measurements_is_the_same(tmp_path, own):
-    make, robot = bag_messages(), load('ur5')
+    make, robot = bag_messages(), catalog.load('ur5')
     with BagWriter(tmp_path / 'bag') as bag:
         for k in range(1, 6):
             joints = make.joint_state(k * SECOND, robot.joint_names, np.zeros(6))
@@ -155,25 +154,11 @@ def test_an_empty_bag_is_described_not_refused(tmp_path):
     assert not info.usable
 
 
-def test_a_damaged_bag_is_refused_in_one_sentence(tmp_path):
-    write_joints(tmp_path / 'bag', [SECOND])
-    file = tmp_path / 'bag' / 'bag.mcap'
-    file.write_bytes(file.read_bytes()[:-20])
-    with pytest.raises(DataError, match='damaged or was cut short'):
-        bag_info(tmp_path / 'bag')
-
-
 ROBOT = catalog.load('ur5')
 
 
 def ends(first, last, step=0.01):
     return Ends(*(round(value * SECOND) for value in (first, last, step)))
-
-
-def test_streams_that_begin_and_end_within_four_steps_are_even():
-    assert uneven_ends({'a': ends(0.0, 10.0), 'b': ends(0.039, 9.961)}) == ()
-    assert uneven_ends({'a': ends(0.0, 10.0)}) == ()
-    assert uneven_ends({}) == ()
 
 
 def test_a_late_start_and_an_early_end_are_told_with_their_length():
@@ -184,11 +169,11 @@ def test_a_late_start_and_an_early_end_are_told_with_their_length():
     )
 
 
-def test_a_slow_stream_may_begin_within_four_of_its_own_steps():
-    streams = {'/joints': ends(0.0, 60.0), '/temperature': ends(30.0, 40.0, step=10.0)}
-    assert uneven_ends(streams) == ()
-    streams = {'/joints': ends(0.0, 60.0), '/temperature': ends(41.0, 51.0, step=10.0)}
-    assert len(uneven_ends(streams)) == 1
+def test_a_stream_may_begin_within_four_of_its_own_steps():
+    assert uneven_ends({'a': ends(0.0, 10.0), 'b': ends(0.039, 9.961)}) == uneven_ends({}) == ()
+    for first, told in ((30.0, 0), (41.0, 1)):
+        slow = ends(first, first + 10.0, step=10.0)
+        assert len(uneven_ends({'/joints': ends(0.0, 60.0), '/temperature': slow})) == told
 
 
 @pytest.mark.parametrize(
@@ -221,14 +206,11 @@ SENTENCES = (
 )
 
 
-def test_info_names_the_stream_that_was_cut(cut_bag):
+def test_the_stream_that_was_cut_is_named_and_the_recording_carries_it(cut_bag):
     info = bag_info(cut_bag)
     assert info.incomplete == SENTENCES
     assert info.notes[:2] == SENTENCES
     assert info.usable
-
-
-def test_a_recording_carries_what_is_missing_of_it(cut_bag):
     recording = read_recording(cut_bag, ROBOT)
     assert recording.incomplete == SENTENCES
     assert SENTENCES[0] in recording.notes

@@ -1,6 +1,5 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-import csv
 import re
 
 import numpy as np
@@ -10,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.bags import read_recording, write_recording
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_msgs_py.tables import TableOptions, read_table
 
@@ -20,14 +18,6 @@ JOINTS = ['j1', 'j2', 'j3', 'j4', 'j5', 'j6']
 @pytest.fixture
 def ur5():
     return catalog.load('ur5')
-
-
-def columns_of(path, delimiter):
-    """Read a table with the standard library alone; a decimal comma becomes a point."""
-    with open(path, newline='') as file:
-        rows = list(csv.reader(file, delimiter=delimiter))
-    cells = [[float(cell.replace(',', '.')) for cell in row] for row in rows[1:]]
-    return dict(zip(rows[0], np.array(cells).T, strict=True))
 
 
 def poses(robot, count=12, seed=2):
@@ -40,29 +30,6 @@ def table(path, header, *blocks, delimiter=','):
     lines = [delimiter.join(header), *(delimiter.join(repr(float(v)) for v in r) for r in rows)]
     path.write_text('\n'.join(lines) + '\n')
     return path
-
-
-# The two published formats -------------------------------------------------------------------
-
-
-def test_the_sign_of_the_difference_is_the_users(data, ur5):
-    raw = columns_of(data / 'ur5_like.csv', ',')
-    options = TableOptions(difference='subtract')
-    recording, _ = read_table(data / 'ur5_like.csv', ur5, options)
-    expected = (raw['x_t'] - raw['x_dif']) / 1000
-    np.testing.assert_allclose(recording.measured.position[:, 0], expected, atol=1e-15)
-
-
-def test_an_imported_table_survives_the_bag(data, tmp_path):
-    robot = catalog.load('ur10')
-    recording, _ = read_table(data / 'ur10_like.csv', robot)
-    write_recording(tmp_path / 'bag', recording, robot)
-    back = read_recording(tmp_path / 'bag', robot)
-    assert back.joints.static
-    np.testing.assert_array_equal(back.measured.position, recording.measured.position)
-    np.testing.assert_allclose(back.measured.rotation, recording.measured.rotation, atol=1e-14)
-    np.testing.assert_allclose(back.measured.sigma, recording.measured.sigma, rtol=1e-14)
-    np.testing.assert_array_equal(back.temperature.value, recording.temperature.value)
 
 
 # What is found out ---------------------------------------------------------------------------
@@ -176,11 +143,6 @@ def test_rows_with_a_gap_are_left_out_and_counted(tmp_path, ur5):
     assert '1 rows with empty cells left out, the first in line 5' in said
 
 
-def test_rows_to_skip_are_skipped(data, ur5):
-    recording, _ = read_table(data / 'ur5_like.csv', ur5, TableOptions(skip_rows=(1, 24)))
-    assert recording.joints.t.size == 22
-
-
 # What is refused -----------------------------------------------------------------------------
 
 HEAD = 'j1,j2,j3,j4,j5,j6,x,y,z'
@@ -231,14 +193,6 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
     assert '\n' not in str(caught.value)
 
 
-def test_blank_lines_before_the_header_do_not_matter(data, tmp_path, ur5):
-    text = (data / 'ur5_like.csv').read_text()
-    (tmp_path / 'late.csv').write_text('\n' * 40 + text)
-    late, _ = read_table(tmp_path / 'late.csv', ur5)
-    usual, _ = read_table(data / 'ur5_like.csv', ur5)
-    np.testing.assert_array_equal(late.measured.position, usual.measured.position)
-
-
 def test_a_spreadsheet_is_no_table(tmp_path, ur5):
     (tmp_path / 't.xlsx').write_bytes(b'PK\x03\x04\0\0\0\0')
     with pytest.raises(DataError, match='is no text; save it as CSV'):
@@ -250,16 +204,13 @@ def test_a_missing_table_is_named(tmp_path, ur5):
         read_table(tmp_path / 'nowhere.csv', ur5)
 
 
-def test_positions_of_another_robot_are_told_and_left_to_diagnose(tmp_path, ur5):
+def test_positions_of_another_robot_are_told_and_refused_where_the_user_said_how_to_read(
+    tmp_path, ur5
+):
     q, T = poses(load_robot('abb_irb1600'), 40)
     path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
     said = ' '.join(read_table(path, ur5).assumptions)
     assert 'wrong robot, joint columns, or units' in said and 'weld-twin diagnose' in said
-
-
-def test_positions_of_another_robot_are_refused_where_the_user_said_how_to_read(tmp_path, ur5):
-    q, T = poses(load_robot('abb_irb1600'), 40)
-    path = table(tmp_path / 't.csv', [*JOINTS, 'x', 'y', 'z'], q, T[:, :3, 3])
     with pytest.raises(DataError, match='wrong robot, joint columns, or units'):
         read_table(path, ur5, TableOptions(length_unit='m'))
 
@@ -304,9 +255,3 @@ def test_angles_that_fit_several_conventions_need_the_user(tmp_path, ur5):
 def test_options_that_mean_nothing_are_refused(options, words):
     with pytest.raises(DataError, match=re.escape(words)):
         TableOptions(**options)
-
-
-def test_a_column_that_is_not_there_lists_those_there_are(data, ur5):
-    options = TableOptions(position_columns=('x', 'y', 'z'))
-    with pytest.raises(DataError, match="no column 'x'; its columns are step_order, x_t, y_t"):
-        read_table(data / 'ur5_like.csv', ur5, options)

@@ -185,14 +185,6 @@ def test_positions_of_two_arms_in_one_file_are_told(tmp_path):
         read_two_tables(*both(tmp_path, mixed, leica()))
 
 
-def test_a_clock_that_began_later_is_shifted(tmp_path):
-    recording, _ = read_two_tables(
-        *both(tmp_path, ur_rtde(), vicon()), TableOptions(marker='cell:torch'), 0.4
-    )
-    np.testing.assert_allclose(recording.measured.t[0], 0.4, atol=1e-6)
-    assert recording.measured.t[-1] <= recording.joints.t[-1] + 1e-9
-
-
 @pytest.mark.parametrize(
     ('log', 'seen', 'options', 'offset', 'words'),
     [

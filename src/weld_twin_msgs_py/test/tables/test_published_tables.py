@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.diagnosis import diagnose
-from weld_twin_msgs_py.tables import read_table
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import read_recording, write_recording
+from weld_twin_msgs_py.tables import TableOptions, read_table
 
 DATA = Path(__file__).parent / 'data'
 
@@ -80,6 +82,37 @@ def test_two_tables_without_a_date_do_not_share_one(ur5, ur10):
     first, last = ur5.recording.span_ns
     other = ur10.recording.span_ns
     assert last < other[0] or other[1] < first
+
+
+def test_the_sign_of_the_difference_is_the_users():
+    raw = cells('ur5_sample.csv', ',')
+    options = TableOptions(difference='subtract')
+    recording, _ = read_table(DATA / 'ur5_sample.csv', catalog.load('ur5'), options)
+    expected = 1e-3 * (raw['x_t'] - raw['x_dif'])
+    np.testing.assert_allclose(recording.measured.position[:, 0], expected, atol=1e-15)
+
+
+def test_an_imported_table_survives_the_bag(ur10, tmp_path):
+    robot, recording = catalog.load('ur10'), ur10.recording
+    write_recording(tmp_path / 'bag', recording, robot)
+    back = read_recording(tmp_path / 'bag', robot)
+    assert back.joints.static
+    np.testing.assert_array_equal(back.measured.position, recording.measured.position)
+    np.testing.assert_allclose(back.measured.rotation, recording.measured.rotation, atol=1e-14)
+    np.testing.assert_allclose(back.measured.sigma, recording.measured.sigma, rtol=1e-14)
+    np.testing.assert_array_equal(back.temperature.value, recording.temperature.value)
+
+
+def test_blank_lines_before_the_header_do_not_matter(ur5, tmp_path):
+    (tmp_path / 'late.csv').write_text('\n' * 40 + (DATA / 'ur5_sample.csv').read_text())
+    late, _ = read_table(tmp_path / 'late.csv', catalog.load('ur5'))
+    np.testing.assert_array_equal(late.measured.position, ur5.recording.measured.position)
+
+
+def test_a_column_that_is_not_there_lists_those_there_are():
+    options = TableOptions(position_columns=('x', 'y', 'z'))
+    with pytest.raises(DataError, match=r"no column 'x'; its columns are .*, x_t, y_t"):
+        read_table(DATA / 'ur5_sample.csv', catalog.load('ur5'), options)
 
 
 @pytest.mark.slow

@@ -43,49 +43,6 @@ def test_between_samples_the_motion_is_smooth():
     assert np.abs(got.position - want).max() < 2e-6
 
 
-@pytest.mark.parametrize(
-    'effect, key, column',
-    [
-        ('link_length', 'da', 'a'),
-        ('link_offset', 'dd', 'd'),
-        ('link_twist', 'dalpha', 'alpha'),
-        ('axis_parallelism', 'dbeta', 'beta'),
-        ('joint_offset', 'offset', 'theta_offset'),
-    ],
-)
-@pytest.mark.parametrize(
-    'name, joint', [('standard', 'j1'), ('standard', 'j4'), ('modified', 'j0'), ('modified', 'j6')]
-)
-def test_row_errors(name, joint, effect, key, column):
-    robot, command = ROBOTS[name], stations(ROBOTS[name], 12)
-    got = record(robot, [{'effect': effect, 'joint': joint, key: 1.3e-3}], command)
-    want = dh_positions(robot, command.q, {joint: {column: 1.3e-3}})
-    assert np.abs(got.position - want).max() < 1e-12
-
-
-def test_frame_errors():
-    command = stations(UR5, 10)
-    base = {'effect': 'base_pose', 'xyz': [1e-3, -2e-3, 3e-3], 'rotvec': [0.01, 0.02, -0.03]}
-    tool = {'effect': 'tool_pose', 'xyz': [-2e-3, 1e-3, 4e-3], 'rotvec': [0.02, -0.01, 0.03]}
-    got = record(UR5, [base, tool], command)
-    flawed = {
-        **UR5,
-        'base': _moved(UR5['base'], base, left=True),
-        'tool': _moved(UR5['tool'], tool, left=False),
-    }
-    assert np.abs(got.position - dh_positions(flawed, command.q)).max() < 1e-12
-    last = dh_pose(flawed, command.q[-1])[:3, :3]
-    assert np.abs(Rotation.from_quat(got.quaternion[-1]).as_matrix() - last).max() < 1e-12
-
-
-def _moved(frame, error, left):
-    turn, old = Rotation.from_rotvec(error['rotvec']), Rotation.from_quat(frame['quat_xyzw'])
-    return {
-        'xyz': np.add(frame['xyz'], error['xyz']),
-        'quat_xyzw': ((turn * old) if left else (old * turn)).as_quat(),
-    }
-
-
 def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match='unknown effect'):
         record(UR5, [{'effect': 'gremlins'}], stations(UR5, 3), EXACT)

@@ -12,32 +12,6 @@ HOSE = {'effect': 'hose_pull', 'hook': [-0.3, 0.2, 1.4], 'tension': 30.0, 'lengt
 SPRING = {'effect': 'joint_compliance', 'joint': 'j1', 'compliance': 1e-5}
 
 
-def leaned(robot, q):
-    """Return tool positions on a pedestal that has leaned by the weights at each posture."""
-    world = Rotation.from_quat(robot['base']['quat_xyzw'])
-    origin, out = np.array(robot['base']['xyz']), []
-    for row, straight in zip(q, dh_positions(robot, q), strict=True):
-        frames = dh_links(robot, row)
-        parts = [(f, link) for f, link in zip(frames, robot['links'], strict=True)]
-        tool = Rotation.from_quat(robot['tool']['quat_xyzw']).as_matrix()
-        held = np.vstack([np.c_[tool, robot['tool']['xyz']], [0.0, 0.0, 0.0, 1.0]])
-        parts.append((frames[-1] @ held, robot['payload']))
-        weighed = sum(part['mass'] * (frame @ [*part['com'], 1.0])[:3] for frame, part in parts)
-        moment = np.cross(weighed, robot['gravity'])
-        turn = Rotation.from_rotvec([1e-5 * moment[0], 3e-5 * moment[1], 0.0])
-        out.append(origin + (world * turn * world.inv()).apply(straight - origin))
-    return np.array(out)
-
-
-def test_a_pedestal_leans_by_the_moment_of_all_weights():
-    command = stations(UR5, 12)
-    got = record(UR5, [TILT], command, richness=0.0).position
-    straight = dh_positions(UR5, command.q)
-    moved = leaned(UR5, command.q) - straight
-    assert np.abs(moved).max() > 5e-4
-    assert np.abs(got - straight - moved).max() < 5e-3 * np.abs(moved).max()
-
-
 def test_a_moving_arm_shakes_its_pedestal_a_little():
     command = weave(UR5, 4.0)
     still, shaken = (
@@ -82,18 +56,6 @@ def test_a_line_of_sight_bends_as_the_maker_of_a_laser_says():
 def bare():
     """Return the arm with its base at the origin of the world."""
     return {key: value for key, value in UR5.items() if key != 'base'}
-
-
-def test_warmer_air_ahead_shortens_the_distance():
-    """Light runs faster there: half the gradient of the index times the distance squared."""
-    far = {**bare(), 'base': {'xyz': [6.0, 0.0, 0.0]}}
-    command = stations(far, 8)
-    sight = dh_positions(far, command.q)
-    bent = {'effect': 'refraction', 'warming': [0.3, 0.0, 0.0]}
-    got = record(far, [bent], command, richness=0.0).position
-    shorter = np.linalg.norm(sight, axis=1) - np.linalg.norm(got, axis=1)
-    along = sight[:, 0] * np.linalg.norm(sight, axis=1)
-    assert shorter == pytest.approx(0.5 * 9.27e-7 * 0.3 * along, rel=1e-2)
 
 
 LEVER = np.array([0.0, 0.06, 0.3])

@@ -9,7 +9,6 @@ import pytest
 from plant_cells import (
     UR5,
     dh_positions,
-    gravity_torque,
     joint_displacement,
     record,
     stations,
@@ -62,16 +61,6 @@ def test_stick_slip_stays_within_its_amplitude():
         UR5, [{'effect': 'stick_slip', **CASES['stick_slip']}], weave(UR5, 6.0), 'j2'
     )
     assert 0.7e-3 < np.abs(moved).max() < 1.5e-3
-
-
-def test_loaded_play_follows_the_load():
-    command = stations(UR5, 15)
-    moved = joint_displacement(
-        UR5, [{'effect': 'loaded_play', **CASES['loaded_play']}], command, 'j1'
-    )
-    load = np.array([gravity_torque(UR5, q)[1] for q in command.q])
-    sure = np.abs(load) > 0.3 * np.abs(load).max()
-    assert moved[sure] == pytest.approx(5e-4 * np.sign(load[sure]), rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,7 @@ from weld_twin_msgs_py.programs.source import Source
 from weld_twin_msgs_py.robots.urdf_tree import CORRECTED
 
 from ..streams.supervision import Promise
+from .exporting import without_limits
 from .given_twin import build_twin, diagnosis_of, refuse_mended
 
 SCHEMA = 'weld_twin/correction/1'
@@ -285,7 +286,7 @@ def correction_entry(made: CorrectedProgram, robot: Robot, caps: Caps) -> dict[s
         'expected': {'before': _accuracy(before), 'after': _accuracy(after)},
         'moves': move_rows(made),
         'left': [{'seam': seam, 'why': why} for seam, why in sorted(made.correction.left.items())],
-        'notes': list(made.notes),
+        'notes': [*made.notes, *without_limits(robot)],
     }
 
 

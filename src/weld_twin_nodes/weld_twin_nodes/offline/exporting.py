@@ -96,7 +96,27 @@ def export(
     )
     text = written(made, language)
     _read_again(made, text, language)
-    return made, text, [*_singular(robot, plan.q), *context.controller.notes]
+    notes = [*without_limits(robot), *_singular(robot, plan.q), *context.controller.notes]
+    return made, text, notes
+
+
+def without_limits(robot: Robot) -> list[str]:
+    """Return that no limits are known of some joints; a URDF may leave them out, and none is kept."""
+    finite = {
+        'position': np.isfinite(robot.lower) & np.isfinite(robot.upper),
+        'speed': np.isfinite(robot.max_velocity),
+    }
+    lacking = [
+        f'of {what} for {", ".join(np.array(robot.joint_names)[~known])}'
+        for what, known in finite.items()
+        if not known.all()
+    ]
+    if not lacking:
+        return []
+    return [
+        f'the robot file has no limit {" and ".join(lacking)}, so none is kept; write it in, or check '
+        'every move before the arm makes it'
+    ]
 
 
 def write_program(

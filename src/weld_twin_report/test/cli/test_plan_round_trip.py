@@ -14,7 +14,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.joint_file import read_joint_motion
-from weld_twin_msgs_py.robots import load_robot
+from weld_twin_msgs_py.robots import load_robot, write_urdf
 
 TURNS = [
     (0.0, -1.5708, 0.45),
@@ -113,6 +113,23 @@ def test_it_writes_stations_a_table_and_a_program_of_the_same_postures(tmp_path)
     np.testing.assert_allclose(np.radians(shown), q, atol=1e-6)
     axes = re.findall(r'PTP \{A1 ([-\d.]+),', (out / 'measure.src').read_text())
     np.testing.assert_allclose(np.array(axes, float), shown[:, 0], atol=1e-4)
+
+
+def test_a_urdf_that_leaves_limits_out_is_told_where_moves_are_planned_or_written(tmp_path):
+    urdf, program = tmp_path / 'robot.urdf', tmp_path / 'stations.src'
+    write_urdf(urdf, ROBOT)
+    limits = re.findall('<limit .*?/>', urdf.read_text())
+    bare = urdf.read_text().replace(limits[1], '').replace(limits[3], '<limit velocity="6.5"/>')
+    one, other = ROBOT.joint_names[1], ROBOT.joint_names[3]
+    said = f'note: the robot file has no limit of position for {one}, {other} and of speed for {one}, '
+    words = ('investigate', '--tolerance', 0.3, '--postures', 24, '--out', tmp_path / 'plan')
+    assert 'no limit' not in done(*words, '--robot', urdf, '--force')
+    urdf.write_text(bare)
+    assert said in done(*words, '--robot', urdf, '--force')
+    stations = tmp_path / 'plan/stations.yaml'
+    words = ('export', 'program', stations, '--robot', urdf, '--controller', 'krl')
+    assert said in done(*words, '--out', program)
+    assert said[6:] in (tmp_path / 'stations.src.md').read_text()
 
 
 def test_a_tolerance_out_of_reach_is_told():

@@ -34,6 +34,7 @@ from weld_twin_nodes.cli.given import (
     refuse_unknown_effect,
     twin_of,
 )
+from weld_twin_nodes.offline.exporting import without_limits
 from weld_twin_nodes.offline.set_up_changes import SetUpChange, set_up_change, with_changes
 
 from ...report import print_summary
@@ -88,6 +89,9 @@ def run(given: Given) -> int:
             print_page(place / PAGE, place / PDF)
     console = Console(highlight=False)
     print_summary(diagnosis, console, sheet.demand)
+    if (diagnosis.next_experiment or {}).get('motion'):
+        for note in without_limits(diagnosis.model.robot):
+            console.print(f'note: {note}', markup=False)
     console.print(f'report: {Path(given.out) / PAGE}', markup=False)
     return UNSOUND if diagnosis.status == 'unsound' else 0
 

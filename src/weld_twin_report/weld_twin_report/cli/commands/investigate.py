@@ -56,6 +56,7 @@ def run(given: Given) -> int:
 
 def _planned(given: Given) -> int:
     """Print how many stations and how sure; write the files."""
+    from weld_twin_nodes.offline.exporting import without_limits
     from weld_twin_nodes.offline.measurement_plan import plan_table
 
     given.refuse(('live', 'budget', 'changed'), 'is of an investigation, not of a plan')
@@ -82,6 +83,8 @@ def _planned(given: Given) -> int:
     robot, tolerance = given.load_robot(), given.tolerance * 1e-3
     plan = (_more if given.model else _first)(given, robot, tolerance)
     print('\n'.join(plan_table(plan, tolerance)))
+    if not given.controller:  # its program says so
+        print(*(f'note: {note}\n' for note in without_limits(robot)), sep='', end='')
     if given.out:
         _write_plan(given, robot, plan)
     return 0

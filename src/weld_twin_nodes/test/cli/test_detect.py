@@ -50,22 +50,12 @@ def test_a_board_in_images_becomes_a_table_of_pixels(tmp_path):
         cv2.imwrite(str(tmp_path / 'images' / name), picture(cv2, matrix, shift))
     (tmp_path / 'joints.csv').write_text('image,joint_1 [rad]\nb,0.5\na,-0.25\n')
     out = tmp_path / 'pixels.csv'
-    said = weld_twin(
-        'detect',
-        tmp_path / 'images',
-        '--board',
-        tmp_path / 'board.yaml',
-        '--joints',
-        tmp_path / 'joints.csv',
-        '--out',
-        out,
-    ).out
+    words = ('--board', tmp_path / 'board.yaml', '--joints', tmp_path / 'joints.csv')
+    said = weld_twin('detect', tmp_path / 'images', *words, '--out', out).out
     assert 'the board is in 2 of 2 images' in said
     rows = list(csv.DictReader(out.open()))
-    assert {row['image']: row['joint_1 [rad]'] for row in rows} == {
-        'a.png': '-0.25',
-        'b.png': '0.5',
-    }
+    joints = {row['image']: row['joint_1 [rad]'] for row in rows}
+    assert joints == {'a.png': '-0.25', 'b.png': '0.5'}
     assert len(rows) > 40
     for row in rows:
         seen = [float(row['u [px]']), float(row['v [px]'])]

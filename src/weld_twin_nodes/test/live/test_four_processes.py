@@ -29,6 +29,8 @@ EFFECTS = """
 """
 START = 1_700_000_000_000_000_000
 RATE = 50.0
+EACH = ('/joint_states', '/actual/joint_states', '/measured/tool_pose', '/twin/tool_pose')
+"""Topics with a message for every sample of the motion."""
 
 
 def run_cell(folder, plan, effects, seed=7):
@@ -36,28 +38,15 @@ def run_cell(folder, plan, effects, seed=7):
     with Cell(folder) as cell:
         sure = {'reliable_inputs': True}
         recorder = cell.start('recorder', out=str(folder / 'live'), **sure)
-        cell.start(
-            'deviation_analyzer',
-            wait_for_subscribers=2,
-            path_length=plan.length,
-            metrics_idle=0.3,
-            **sure,
-        )
+        analyzing = {'path_length': plan.length, 'metrics_idle': 0.3}
+        cell.start('deviation_analyzer', wait_for_subscribers=2, **analyzing, **sure)
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
         cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=2, **sure)
         metrics = cell.collect('/deviation/metrics')
         cell.meet()  # the motion is over before an analyzer that met this process late tells anything
-        cell.start(
-            'trajectory_generator',
-            path='line',
-            profile='aggressive',
-            rate=RATE,
-            playback=0.0,
-            follow='/deviation',
-            start_stamp_ns=START,
-            wait_for_subscribers=3,
-            **sure,
-        )
+        moving = {'path': 'line', 'profile': 'aggressive', 'rate': RATE, 'start_stamp_ns': START}
+        paced = {'playback': 0.0, 'follow': '/deviation', 'wait_for_subscribers': 3}
+        cell.start('trajectory_generator', **moving, **paced, **sure)
         n, delayed = plan.motion.t.size, 1 if 'time_delay' in effects else 0
         _wait_for_all(cell, metrics, n, n - delayed)
         # A node says once a second what it sent; of one that is over sooner nothing would be known.
@@ -73,16 +62,8 @@ def _wait_for_all(cell, metrics, samples, pairs):
         lambda: bool(metrics.messages) and from_messages.metrics(metrics.last)['samples'] >= pairs,
         'the last metrics',
     )
-    cell.wait_recorded(
-        {
-            '/joint_states': samples,
-            '/actual/joint_states': samples,
-            '/measured/tool_pose': samples,
-            '/twin/tool_pose': samples,
-            '/deviation': pairs,
-            '/deviation/metrics': len(metrics),
-        }
-    )
+    wanted = dict.fromkeys(EACH, samples)
+    cell.wait_recorded({**wanted, '/deviation': pairs, '/deviation/metrics': len(metrics)})
 
 
 def content(path):
@@ -149,12 +130,7 @@ def test_the_recorded_bag_says_how_it_came_about(live_and_offline):
     assert made['effects'][0]['effect'] == 'backlash'
     sent = len(content(live)['/joint_states'][0])
     whole = {'sent': sent, 'recorded': sent, 'missing': 0}
-    for topic in (
-        '/joint_states',
-        '/actual/joint_states',
-        '/measured/tool_pose',
-        '/twin/tool_pose',
-    ):
+    for topic in EACH:
         # Of a node that a busy computer holds up at the end nothing is said.
         assert made['completeness'].get(topic, whole) == whole
     assert made['completeness'].get('/deviation', whole)['missing'] == 0

@@ -125,38 +125,6 @@ def test_joints_spread_over_publishers_are_put_together_by_equal_stamps():
     assert joints.parts == 1
 
 
-def test_joints_whose_other_half_never_comes_are_refused_and_not_held_over():
-    joints = JointStates(ROBOT)
-    with pytest.raises(DataError):
-        joints.take(state(NAMES[:3], Q[:3]))
-    with pytest.raises(DataError, match="'wrist_1_joint' never came with the stamp"):
-        joints.take(state(NAMES[3:], Q[3:], NS + 1))
-    with pytest.raises(DataError, match="'shoulder_pan_joint' never came with the stamp"):
-        joints.take(state(NAMES[:3], Q[:3], NS + 2))
-    sample = joints.take(state(NAMES[3:], Q[3:], NS + 2))
-    assert sample.stamp == NS + 2
-
-
-def test_messages_about_other_joints_are_passed_over():
-    joints = JointStates(ROBOT)
-    assert joints.take(state(['gripper', 'track'], [0.1, 2.0])) is None
-    assert joints.others == 1
-    sample = joints.take(state(['gripper', *NAMES[::-1]], [0.1, *Q[::-1]]))
-    np.testing.assert_array_equal(sample.q, Q)
-
-
-@pytest.mark.parametrize('value', [np.nan, np.inf, -90.0])
-def test_the_quick_way_refuses_what_the_thorough_way_refuses(value):
-    joints = JointStates(ROBOT)
-    usual = state(NAMES, Q, qd=np.zeros(6))
-    usual.name = names = tuple(NAMES)
-    joints.take(usual)
-    bad = state(NAMES, [*Q[:2], value, *Q[3:]], NS + 1, np.zeros(6))
-    bad.name = names
-    with pytest.raises(DataError, match='elbow_joint'):
-        joints.take(bad)
-
-
 def test_deviations_are_drawn_at_their_place_magnified_and_by_colour():
     lines = DeviationLines(magnification=100.0, tolerance=1e-3, spacing=0.01, points=3)
     for k in range(6):

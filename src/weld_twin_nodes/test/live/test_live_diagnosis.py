@@ -23,18 +23,13 @@ from weld_twin_msgs_py.messages.topics import (
     MEASURED_POINT,
     TopicNames,
 )
+from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
-from weld_twin_nodes.live.live_diagnosis import LONGEST, Window
+from weld_twin_nodes.live.live_diagnosis import LONGEST, LiveDiagnosis, Window
 from weld_twin_nodes.offline.given_twin import given_cameras
 
 START = 1_700_000_000_000_000_000
-ONE_JOINT = Robot.from_mapping(
-    {
-        'name': 'one',
-        'convention': 'standard',
-        'joints': [{'name': 'a', 'a': 0.5, 'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0}],
-    }
-)
+ONE_JOINT = Robot.from_mapping({'name': 'one', 'joints': [{'name': 'a', 'a': 0.5}]})
 OFFSET = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}
 
 
@@ -197,10 +192,6 @@ def test_what_a_camera_sees_is_diagnosed_in_the_other_process(tmp_path):
 
 
 def test_the_node_hears_what_cameras_see(tmp_path):
-    pytest.importorskip('rclpy', reason='needs ROS 2')
-    from weld_twin_nodes.harness import Cell
-    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
-
     motion, seen = seen_by_a_camera(tmp_path)
     with Cell(tmp_path / 'cell') as cell:
         options = {'cameras': f'eye={tmp_path}/eye.yaml', 'targets': f'b={tmp_path}/board.yaml'}
@@ -233,10 +224,6 @@ def test_a_job_under_way_can_be_ended(recording):
 
 
 def test_the_node_is_quiet_until_it_has_evidence_and_then_tells_its_end_too(tmp_path):
-    pytest.importorskip('rclpy', reason='needs ROS 2')
-    from weld_twin_nodes.harness import Cell
-    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
-
     nothing = Finding(START, 'none', 'No gap.', {'gap_rms_m': 1e-5})
     gap = Finding(START + 1, 'identified', 'A gap.', {'gap_rms_m': 1e-3})
     with Cell(tmp_path / 'cell') as cell:
@@ -251,10 +238,6 @@ def test_the_node_is_quiet_until_it_has_evidence_and_then_tells_its_end_too(tmp_
 
 
 def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(recording, tmp_path):
-    pytest.importorskip('rclpy', reason='needs ROS 2')
-    from weld_twin_nodes.harness import Cell
-    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
-
     q = np.array(recording.joints.q)
     q[:, [3, 5]] = q[:, [5, 3]]
     swapped = replace(recording, joints=replace(recording.joints, q=q))
@@ -278,9 +261,6 @@ def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(recordin
 
 @pytest.mark.cells
 def test_the_node_tells_a_gap_from_the_streams(tmp_path):
-    pytest.importorskip('rclpy', reason='needs ROS 2')
-    from weld_twin_nodes.harness import Cell
-
     motion, seen = swinging()
     (tmp_path / 'one.yaml').write_text(yaml_text(ONE_JOINT.to_mapping()))
     options = {'robot': str(tmp_path / 'one.yaml'), 'least': 5.5, 'every': 1.0}

@@ -52,24 +52,8 @@ def same(messages, recorded, topic):
 
 
 def player(cell, *topics, options=()):
-    return cell.start(
-        [
-            sys.executable,
-            '-m',
-            'weld_twin_nodes',
-            'bag',
-            'play',
-            str(BAG),
-            '--rate',
-            '6',
-            '--wait',
-            '60',
-            '--clock',
-            *options,
-            '--topics',
-            *topics,
-        ]
-    )
+    words = ['bag', 'play', str(BAG), '--rate', '6', '--wait', '60', '--clock', *options]
+    return cell.start([sys.executable, '-m', 'weld_twin_nodes', *words, '--topics', *topics])
 
 
 SIM = {'use_sim_time': True, 'reliable_inputs': True}

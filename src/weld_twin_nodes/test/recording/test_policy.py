@@ -2,22 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The security policy allows each node what it does, and nothing else."""
 
-from importlib import import_module
 from pathlib import Path
 
 import pytest
+from command_line import done
 from defusedxml.ElementTree import parse
-
-from weld_twin_nodes.cli.in_process import weld_twin
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.messages.topics import BY_NAME, FRAMES, ROBOT_DESCRIPTION
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.process import MODULES
-from weld_twin_nodes.live.cell_node import CellNode
 from weld_twin_nodes.live.policy import policy
+from weld_twin_nodes.live.settings import MODULES, node_class
 
 pytestmark = pytest.mark.cells
 
@@ -56,17 +53,6 @@ def allowed(profile, kind, permission):
     ]
     assert len(names) == len(set(names))
     return {own + n[1:] if n.startswith('~') else f'/{n.lstrip("/")}' for n in names}
-
-
-def node_class(name):
-    module = import_module(MODULES[name])
-    return next(
-        item
-        for item in vars(module).values()
-        if isinstance(item, type)
-        and issubclass(item, CellNode)
-        and item.__module__ == module.__name__
-    )
 
 
 @pytest.mark.parametrize('name', MODULES)
@@ -112,25 +98,14 @@ def test_the_policy_speaks_of_the_nodes_there_are_and_denies_nothing_by_name():
 
 
 def test_the_file_is_what_the_command_prints():
-    code, printed, _ = weld_twin('export', 'policy')
-    assert code == 0
-    assert printed == POLICY.read_text(encoding='utf-8')
+    assert done('export', 'policy') == POLICY.read_text(encoding='utf-8')
 
 
 def test_a_namespace_and_remaps_change_the_names_they_mean(tmp_path):
     out = tmp_path / 'left.xml'
-    words = [
-        'export',
-        'policy',
-        '--namespace',
-        '/left',
-        '--nodes',
-        'forward_kinematics_twin',
-        '--out',
-        str(out),
-    ]
-    code, *_ = weld_twin(*words, '--remap', 'joint_states:=/cell/states', '--remap', '/tf:=tf')
-    assert code == 0
+    words = ('--namespace', '/left', '--nodes', 'forward_kinematics_twin', '--out', out)
+    remaps = ('--remap', 'joint_states:=/cell/states', '--remap', '/tf:=tf')
+    done('export', 'policy', *words, *remaps)
     (profile,) = parse(out).getroot().iter('profile')
     assert (profile.get('ns'), profile.get('node')) == ('/left', 'forward_kinematics_twin')
     heard = next(b for b in profile if b.get('subscribe') == 'ALLOW')

@@ -18,15 +18,18 @@ from diagnosis_cells import all_but
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.effects.dated import JointSlip, ToolSlip
+from weld_twin_core.effects import Drift, InstrumentKnock, JointCompliance, JointSlip, ToolSlip
+from weld_twin_core.effects.dated import from_now_on
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.programs.plain import _frames, tool_pose
 from weld_twin_msgs_py.bags import write_recording
-from weld_twin_msgs_py.files.diagnosis_model import load_model
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.robots import read_robot_yaml, write_robot_yaml
+from weld_twin_nodes.offline.correcting import program_model
 from weld_twin_nodes.offline.exports import write_all
+from weld_twin_nodes.offline.given_twin import build_twin, left_behind
 
 KINDS = ('joint_offset', 'link_length', 'link_offset', 'joint_compliance')
 LOAD, YIELDS, LONGER, G = 12.0, 4e-6, 5e-4, 9.80665
@@ -150,15 +153,29 @@ def test_frames_fitted_beside_curves_are_fitted_anew_for_the_file(uneven):
     assert alone < 1.1 * before
 
 
-def test_files_say_that_they_have_the_tool_as_it_was_before_it_slipped(tmp_path):
-    slip = ToolSlip(xyz=[5e-4, 0.0, 0.0], time=12.0)
-    model = Model(NOMINAL, (np.eye(4),), found=(slip, JointSlip('joint_2', 1e-3, 7.0)))
+def test_files_live_twin_and_programs_have_what_slipped_as_it_is_since(tmp_path):
+    slips = (
+        ToolSlip(xyz=[5e-4, 0.0, 0.0], time=12.0),
+        JointSlip('joint_2', 1e-3, 7.0),
+        InstrumentKnock(xyz=[0.0, 3e-4, 0.0], time=2.0),
+    )
+    found = (*slips, Drift([1e-3, 0.0, 0.0]), JointCompliance('joint_3', YIELDS))
+    model = Model(NOMINAL, (np.eye(4),), found=found)
     write_all(tmp_path, model)
-    for name in ('robot.yaml', 'robot.urdf', 'effects.yaml', 'robot_effects.yaml'):
-        text = (tmp_path / name).read_text()
-        assert 'at t = 12 s stays with the set-up' in text, name
-        assert 'the tool is taken as it was before' in text, name
-        assert 't = 7 s' not in text, name
+    entry = {'tool': TOOL.tolist(), 'bases': [np.eye(4).tolist()], 'statics': 'settled'}
+    entry['found'] = [effect.to_mapping() for effect in found]
+    file = tmp_path / 'diagnosis.json'
+    file.write_text(json.dumps({'schema': 'weld_twin/diagnosis/2', 'model': entry}))
+    since = Twin(NOMINAL, [*(replace(slip, time=-1.0) for slip in slips), found[-1]])
+    live = build_twin(NOMINAL, file)
+    assert_same_tool(live, since)
+    (said,) = left_behind(read_diagnosis(file), live.effects)
+    assert 'drift of the frame grew with the time' in said
+    robot = read_robot_yaml(tmp_path / 'robot.yaml')
+    left = read_effects(tmp_path / 'robot_effects.yaml', robot)
+    assert_same_tool(Twin(robot, from_now_on(left)), since)
+    mends = {effect.name for effect in program_model(NOMINAL, file).acting}
+    assert mends == {'tool_pose', 'joint_offset', 'joint_compliance'}
 
 
 def test_page_says_which_file_to_take(found):

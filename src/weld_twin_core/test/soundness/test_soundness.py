@@ -19,10 +19,12 @@ from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.set_up import setup
 from weld_twin_core.diagnosis.soundness.slips import Slip
-from weld_twin_core.effects import REGISTRY, JointOffset, effects_from_list
+from weld_twin_core.effects import REGISTRY, JointOffset, ToolPose, effects_from_list
 from weld_twin_core.effects.dated import InstrumentKnock, of_the_robot
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.compensation import commandable
+from weld_twin_core.twin.twin import Twin
 
 
 def looked_at(robot, *recordings, align=('base', 'tool'), apply=False):
@@ -207,11 +209,21 @@ def test_what_was_taken_out_of_the_library_may_be_what_looks_like_a_slip(
     assert told is (kept if sound else refused)
 
 
-def test_a_slip_stays_with_the_robot_and_a_knock_with_its_set_up(ur5):
+def test_what_slipped_stays_so_and_no_program_is_moved_by_a_knock(ur5, rng):
     entries = [{**entry, 'time': 5.0} for entry, _ in SLIPS.values()]
-    left = of_the_robot(effects_from_list(entries, ur5))
-    assert [type(effect) for effect in left] == [JointOffset]
-    assert left[0].offset == 1.5e-3
+    slips = effects_from_list(entries, ur5)
+    lasting = of_the_robot(slips)
+    assert {type(effect) for effect in lasting} == {JointOffset, ToolPose, InstrumentKnock}
+    assert [commandable(e) for e in lasting] == [e.name != 'instrument_knock' for e in lasting]
+    late = stations(ur5, rng, count=4)
+    later = Recording('later', JointMotion(late.t + 5.0, late.q, static=True))
+    one, other = (Twin(ur5, effects).poses(later) for effects in (slips, lasting))
+    np.testing.assert_allclose(other.position, one.position, atol=1e-12)
+    again = effects_from_list([effect.to_mapping() for effect in lasting], ur5)
+    first = Recording('first', late)
+    np.testing.assert_array_equal(
+        Twin(ur5, again).poses(first).position, Twin(ur5, lasting).poses(first).position
+    )
 
 
 def test_reflectors_at_other_places_of_the_flange_are_tools_of_their_own(ur5, rng):

@@ -14,13 +14,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from ..recording import FIRST_DATE_NS, Recording
 from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
-from .geometry import ChannelError, FrameError, JointOffset, frame_parameters
+from .geometry import ChannelError, FrameError, JointOffset, ToolPose, frame_parameters
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 from .wording import radians
 
@@ -52,9 +52,20 @@ class _Timed(LinearEffect):
         return [{channel: value * share for channel, value in shift.items()} for shift in whole]
 
 
+class _Twin(TwinHooks):
+    effect: Sudden
+
+    def lasting(self) -> Effect:
+        """Return the constant that it is from its instant on: what gave way stays so until mended."""
+        sizes = (parameter.name for parameter in self.effect.parameters)
+        values: dict[str, Any] = {name: getattr(self.effect, name) for name in sizes}
+        kind = self.effect.since_then or type(self.effect)
+        return kind(*filter(None, [self.effect.site]), **values)
+
+
 class Sudden(_Timed):
     """
-    What sets in at ``time`` [s].
+    What sets in at ``time`` [s]; left out, it is there all the time.
 
     A search takes it in only where the checks of the data found the instant: a step fits any
     slow change halfway.
@@ -62,16 +73,12 @@ class Sudden(_Timed):
 
     time: float
     traits = Traits(depends_on='time', dated=True, jumps=True, common=False)
+    twin = Hooked(_Twin)
+    since_then: ClassVar[type[Effect] | None] = None
+    """The kind of constant that it is afterwards; None where it is one of its own all the time."""
 
     def share(self, view: View) -> Array:
         return (view.t >= self.time).astype(np.float64)
-
-
-class _Twin(TwinHooks):
-    effect: JointSlip
-
-    def lasting(self) -> JointOffset:
-        return JointOffset(self.effect.joint, self.effect.offset)
 
 
 @register
@@ -80,7 +87,7 @@ class JointSlip(Sudden, ChannelError):
 
     joint: str
     offset: Value = 0.0
-    time: float = 0.0
+    time: float = -np.inf
 
     traits = replace(
         Sudden.traits,
@@ -100,7 +107,7 @@ class JointSlip(Sudden, ChannelError):
         )
         .plausible_sliding((5e-3, 0.1), 'derived: a tooth of a belt or a rack'),
     )
-    twin = Hooked(_Twin)
+    since_then = JointOffset
 
     def remedy(self, robot: Robot) -> str:
         at = robot.index(str(self.site))
@@ -116,9 +123,7 @@ class JointSlip(Sudden, ChannelError):
 class _SuddenFrame(Sudden, FrameError):
     """A frame that stands elsewhere from an instant on."""
 
-    time: float = 0.0
-
-    traits = replace(Sudden.traits, of_setup=True)
+    time: float = -np.inf
 
 
 @register
@@ -126,7 +131,7 @@ class ToolSlip(_SuddenFrame):
     """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
 
     traits = replace(
-        _SuddenFrame.traits,
+        Sudden.traits,
         title='slipped tool or reflector',
         meaning='tool or reflector moved on the flange at one instant',
         formula='like `tool_pose`, from the instant `time` on; a cause only where the checks of'
@@ -135,6 +140,7 @@ class ToolSlip(_SuddenFrame):
         place='tool',
     )
     channel = 'tool'
+    since_then = ToolPose
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.05, 'derived: a holder or a nest that gave way'),
         Plausible.even(2e-2, 0.4, 'derived: a holder that gave way'),
@@ -152,7 +158,8 @@ class InstrumentKnock(_SuddenFrame):
     """The base is displaced by xyz in the world and turned by rotvec from ``time`` [s] on."""
 
     traits = replace(
-        _SuddenFrame.traits,
+        Sudden.traits,
+        of_setup=True,
         title='knocked instrument or base',
         meaning='instrument or base was moved at one instant',
         formula='like `base_pose`, from the instant `time` on; a cause only where the checks of'
@@ -259,18 +266,17 @@ class SetupSettling(_SetupMotion):
 
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return what is left of the effects for the robot ever after, without those of one set-up."""
+    """
+    Return the effects as they act ever after: what slipped stays so until somebody mends it.
+
+    How a set-up moved by itself is left out: it stands then as it was aligned.
+    """
     return tuple(e for e in (effect.twin.lasting() for effect in effects) if e is not None)
 
 
-def left_behind(effects: Sequence[Effect]) -> list[str]:
-    """Return which causes `of_the_robot` leaves with the set-up that had them, in sentences."""
-    return [
-        f'{effect.traits.title} at t = {effect.time:.4g} s stays with the set-up that was recorded: '
-        f'the {effect.channel} is taken as it was before that, so mend it first.'
-        for effect in effects
-        if isinstance(effect, _SuddenFrame)
-    ]
+def from_now_on(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return what is known of effects after the recordings: not what grows with the time for ever."""
+    return tuple(effect for effect in of_the_robot(effects) if not effect.traits.endless)
 
 
 def seen_from(
@@ -279,13 +285,10 @@ def seen_from(
     """
     Return effects for another recording: the set-up's motion at its right time, or left out.
 
-    Where the other does not overlap in time with ``span_ns``, first and last stamp of the one
-    whose set-up moved, which count from ``epoch_ns``, it is taken for another set-up.
+    Where the other overlaps in time with ``span_ns``, first and last stamp of the one whose set-up
+    moved, which count from ``epoch_ns``, it is taken for a part of the same.
     """
-    first, last = other.span_ns
-    if last < span_ns[0] or first > span_ns[1]:
-        return of_the_robot(effects)
-    return _recounted(effects, (other.epoch_ns - epoch_ns) * 1e-9)
+    return in_use(effects, epoch_ns, span_ns, other, same=_overlap(span_ns, other))[0]
 
 
 def in_use(
@@ -300,27 +303,35 @@ def in_use(
     Return effects as they act in another recording of the same cell, and what to say of that.
 
     What slipped stays slipped until somebody mends it. Where nothing tells when one of both was
-    recorded, the other is taken to have been begun as the one diagnosed ended.
+    recorded, the other is taken to have been begun after the one diagnosed.
 
     epoch_ns, span_ns: see `seen_from`.
-    same: the other is the one diagnosed, so that their stamps count from the same instant.
+    same: stamps of both count from the same instant, as in the one diagnosed and its parts.
     """
-    known = same or (other.dated and epoch_ns >= FIRST_DATE_NS)
-    first, last = other.span_ns
-    if not known:
-        begun = (span_ns[1] - epoch_ns) * 1e-9 - float(other.joints.t[0])
-        why = ', for stamps without a date do not tell when; give both the date and time'
-    elif last < span_ns[0] or first > span_ns[1]:
-        begun, why = (other.epoch_ns - epoch_ns) * 1e-9, ''
+    known, later = same or _dated(epoch_ns, other), (other.epoch_ns - epoch_ns) * 1e-9
+    if known and _overlap(span_ns, other):
+        return _recounted(effects, later), []
+    why, after = '', not known or other.span_ns[0] > span_ns[1]
+    if known:
+        out = _recounted([e for e in effects if not isinstance(e, _SetupMotion)], later)
     else:
-        return _recounted(effects, (other.epoch_ns - epoch_ns) * 1e-9), []
-    after = not known or first > span_ns[1]
-    return _recounted([e for e in effects if not isinstance(e, _SetupMotion)], begun), [
+        out = of_the_robot(effects)
+        why = ', for stamps without a date do not tell when; give both the date and time'
+    return out, [
         f'{effect.traits.title} at t = {effect.time:.4g} s of the recording diagnosed: '
         f'{other.name} is taken as recorded {"after" if after else "before"} that{why}.'
         for effect in effects
         if isinstance(effect, Sudden)
     ]
+
+
+def _dated(epoch_ns: int, other: Recording) -> bool:
+    return other.dated and epoch_ns >= FIRST_DATE_NS
+
+
+def _overlap(span_ns: tuple[int, int], other: Recording) -> bool:
+    first, last = other.span_ns
+    return last >= span_ns[0] and first <= span_ns[1]
 
 
 def _recounted(effects: Sequence[Effect], later: float) -> tuple[Effect, ...]:

@@ -71,6 +71,8 @@ class Traits:
     """Whether it belongs to one set-up and not to the robot."""
     dated: bool = False
     """Whether it sets in at an instant, and is a cause only where the data checks found one."""
+    endless: bool = False
+    """Whether it grows with the time for ever: how large it is after a recording nobody knows."""
     jumps: bool = False
     """Whether it jumps at an instant or at places of its joint, of which no derivative knows."""
     common: bool = True

@@ -164,6 +164,7 @@ class ClockRate(Effect):
         'runs fast against that of the joints',
         entered='its clocks',
         depends_on='time',
+        endless=True,
         place='clock',
         common=False,
     )
@@ -211,6 +212,7 @@ class Drift(LinearEffect):
         apart={'thermal_growth': 'measure a fixed point beside the arm while it works'},
         entered='what the frame stands on, or of the temperature',
         depends_on='time',
+        endless=True,
         place='base',
         common=False,
     )

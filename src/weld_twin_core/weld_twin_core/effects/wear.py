@@ -35,6 +35,7 @@ class Wear(Effect):
         "slowing along the tool's z, − rate (t − t_first) where slowing is 0",
         entered='tool',
         depends_on='time',
+        endless=True,
         place='tool',
         common=False,
     )

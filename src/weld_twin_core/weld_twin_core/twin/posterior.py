@@ -25,6 +25,7 @@ from scipy.special import ndtri
 
 from ..arm.robot import Robot
 from ..arrays import Array, halton, readonly
+from ..effects.dated import of_the_robot
 from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, JointSignal, Recording, Signal
@@ -191,7 +192,8 @@ class Posterior:
         """
         Return how sure the tool's own poses are on a motion to come, which nobody measures.
 
-        What was found of the instrument, its clock and the set-up stays with the recording. The
+        What was found of the instrument, its clock and the set-up stays with the recording, and what
+        slipped is as it was after that (`of_the_robot`). The
         middle of the allowed models may hold less of it than the fit, and more of the arm in its
         place: counted together, the two would cancel.
         """
@@ -199,10 +201,10 @@ class Posterior:
         stays = [commandable(effect) for effect in what.effects]
         own = np.repeat(stays, what.sizes).astype(bool)
         keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(what.shapes, bool)])
-        effects = tuple(e for e, stay in zip(what.effects, stays, strict=True) if stay)
+        effects = (e for e, stay in zip(what.effects, stays, strict=True) if stay)
         return replace(
             self,
-            directions=replace(what, effects=effects),
+            directions=replace(what, effects=of_the_robot(tuple(effects))),
             mean=self.mean[keep],
             covariance=self.covariance[np.ix_(keep, keep)],
             prior_std=None if self.prior_std is None else self.prior_std[keep],

@@ -15,7 +15,7 @@ from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
-from weld_twin_core.effects.dated import in_use, left_behind, of_the_robot
+from weld_twin_core.effects.dated import in_use, of_the_robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Counted, Recording
 from weld_twin_core.twin.twin import Twin
@@ -243,7 +243,7 @@ def timed(
         ends = int(span[0]), int(span[1])
         effects, said = in_use(twin.effects, epoch, ends, recording, same=same)
     except (KeyError, IndexError, TypeError, ValueError):
-        effects, said = of_the_robot(twin.effects), left_behind(twin.effects)
+        effects, said = of_the_robot(twin.effects), []
     return Twin(twin.robot, effects), said
 
 

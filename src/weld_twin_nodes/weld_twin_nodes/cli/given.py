@@ -328,9 +328,11 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
 
 def say_doubts(robot: Robot, effects: Sequence[Effect], path: str, robot_file: str = '') -> None:
     """Say on stderr what in a model may be a slip of its file, and that the robot's was changed."""
-    from ..offline.given_twin import changed_robot, diagnosis_of, doubts
+    from ..offline.given_twin import changed_robot, diagnosis_of, doubts, left_behind
 
-    for doubt in changed_robot(diagnosis_of(path), robot_file) + doubts(robot, effects):
+    content = diagnosis_of(path)
+    said = changed_robot(content, robot_file) + left_behind(content, effects)
+    for doubt in said + doubts(robot, effects):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
 
 

@@ -19,8 +19,7 @@ from weld_twin_core.arm.rotation import (
     transform,
 )
 from weld_twin_core.arrays import Array
-from weld_twin_core.effects import Effect, effects_from_list
-from weld_twin_core.effects.dated import left_behind
+from weld_twin_core.effects import Effect
 from weld_twin_core.errors import DataError, ModelError, TwinError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Role
@@ -39,7 +38,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from ..offline.given_twin import changed_robot, diagnosis_of, doubts, entries_of
+from ..offline.given_twin import changed_robot, diagnosis_of, doubts, left_behind
 from .cell_node import CellNode
 from .settings import NO_NUMBERS, Setting
 
@@ -283,8 +282,8 @@ def say_doubts(node: CellNode, robot: Robot, effects: Sequence[Effect]) -> None:
     """Warn of all in the node's model that may be a slip, and of joints that it was told otherwise."""
     path = node.setting('model')
     content = diagnosis_of(path)
-    stays = left_behind(effects_from_list(entries_of(content), robot))
-    for doubt in changed_robot(content, node.setting('robot')) + doubts(robot, effects) + stays:
+    said = changed_robot(content, node.setting('robot')) + left_behind(content, effects)
+    for doubt in said + doubts(robot, effects):
         node.warn(doubt, doubt)
     if (content.get('model') or {}).get('counted') is not None:
         sentence = (

@@ -17,7 +17,7 @@ from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.dated import left_behind, of_the_robot
+from weld_twin_core.effects.dated import from_now_on
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.travel import repeated
 from weld_twin_core.recording import JointMotion, Recording, checked_temperature
@@ -98,10 +98,10 @@ def program_model(
     content = diagnosis_of(path)
     if 'model' in content or content.get('unsound'):
         placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
-        result, posterior = model.found, read_posterior(robot, path)
+        result, posterior = from_now_on(model.found), read_posterior(robot, path)
         if posterior is not None:
             result, posterior = posterior.of_the_arm().centred(result)
-        effects = of_the_robot((*model.known, *result))
+        effects = (*from_now_on(model.known), *result)
         _refuse_by_effort(effects, path)
         return ProgramModel(placed, effects, posterior, temperature, setup)
     twin = build_twin(robot, path, mended=True)
@@ -216,14 +216,6 @@ def _unused(program: Program, context: Context) -> list[str]:
             for name in sorted(given.keys() - {each.lower() for each in used})
         ]
     return out
-
-
-def left_to_mend(robot: Robot, path: Path | str) -> list[str]:
-    """Return what a diagnosis found to have slipped and its model takes as it was before."""
-    if 'model' not in diagnosis_of(path):
-        return []
-    model = read_model(robot, path)
-    return left_behind(model.known + model.found)
 
 
 def other_causes(content: Mapping[str, Any]) -> list[str]:

@@ -12,7 +12,7 @@ from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.dated import left_behind, of_the_robot
+from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.compensation import corrected, joint_offsets
 from weld_twin_core.twin.posterior import Posterior
@@ -166,7 +166,7 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
 def write_effects(path: Path, model: Model, notes: Sequence[str]) -> None:
     """Write every effect, known and found, for use with the nominal robot."""
     pair = _pair(model, corrected=False)
-    head = [_EVERYTHING, *pair, *_mended(model), *_left_behind(model), *notes]
+    head = [_EVERYTHING, *pair, *_mended(model), *notes]
     _write_effects(path, head, _lasting(model))
 
 
@@ -175,7 +175,7 @@ def write_left_over(path: Path, model: Model, notes: Sequence[str]) -> None:
     robot, remaining = _corrected(model)
     changed = fingerprint(robot) != fingerprint(model.robot)
     pair = _pair(model, corrected=True) if changed else []
-    head = [_LEFT_OVER, *pair, *_readings(model), *_left_behind(model), *notes]
+    head = [_LEFT_OVER, *pair, *_readings(model), *notes]
     _write_effects(path, head, remaining)
 
 
@@ -208,7 +208,7 @@ def write_given_urdf(path: Path, model: Model, notes: Sequence[str], given: Give
 def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
     """Return the head of a robot file: what it leaves by itself, and where the model holds."""
     own = [] if model.alone is None else file_alone(model.alone, left=bool(_corrected(model)[1]))
-    return [*own, *_readings(model), *_left_behind(model), *notes]
+    return [*own, *_readings(model), *notes]
 
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
@@ -264,10 +264,6 @@ def _readings(model: Model) -> list[str]:
             'That is in the numbers below: they take the readings as they were recorded.',
         ]
     return [*notes, 'The numbers below take readings in which that is mended.']
-
-
-def _left_behind(model: Model) -> list[str]:
-    return left_behind(model.known + model.found)
 
 
 def _lasting(model: Model) -> tuple[Effect, ...]:

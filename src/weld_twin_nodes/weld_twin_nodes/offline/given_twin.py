@@ -11,9 +11,9 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.cameras import Camera, Target
-from weld_twin_core.effects import Effect, effects_from_list
+from weld_twin_core.effects import REGISTRY, Effect, effects_from_list
 from weld_twin_core.effects.compliance import LOAD_OF_EFFORT
-from weld_twin_core.effects.dated import of_the_robot
+from weld_twin_core.effects.dated import from_now_on
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin
@@ -29,8 +29,8 @@ for radians are 57 times, millimetres taken for metres a thousand times too larg
 
 def build_twin(
     robot: Robot,
-    # An effects file, or a diagnosis (``.json``) with what it found of the robot, how one set-up
-    # moved left out; empty for none.
+    # An effects file, or a diagnosis (``.json``) with what it found, as that acts after the
+    # recordings (`from_now_on`, `left_behind`); empty for none.
     model: Path | str = '',
     effects: str = '',  # more effects, in the form of an effects file
     *,
@@ -53,7 +53,7 @@ def build_twin(
     if not mended:
         refuse_mended(content, model)
     known = _diagnosed(robot, model, content)
-    return Twin(known.robot, of_the_robot(known.effects) + more)
+    return Twin(known.robot, from_now_on(known.effects) + more)
 
 
 def diagnosis_of(path: Path | str) -> dict[str, Any]:
@@ -102,6 +102,18 @@ def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
     return [
         f"the robot file '{path}' is not as it was when the diagnosis was made; masses, frames and "
         'limits count as they are now'
+    ]
+
+
+def left_behind(content: Mapping[str, Any], effects: Sequence[Effect]) -> list[str]:
+    """Return in a sentence each what a diagnosis found and effects that go on from it are without."""
+    kinds = {REGISTRY[str(entry['effect'])] for entry in entries_of(content)}
+    kinds -= {type(effect) for effect in effects}
+    return [
+        f'{kind.traits.title} grew with the time while it was recorded, and nobody knows how large it '
+        'is now: it is left out, as at the first stamp of the recording'
+        for kind in sorted(kinds, key=lambda kind: kind.name)
+        if kind.traits.endless
     ]
 
 

@@ -15,7 +15,6 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.effects.dated import left_behind
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.motion.inverse.along_path import ILL_CONDITIONED, PathSolution
@@ -240,7 +239,7 @@ class Compensated(NamedTuple):
     motion: JointMotion  # the new commands, counted as the nominal ones came
     remark: str = ''
     """That the commands were read as the diagnosis mended its recordings, and are written as they
-    came, and what stays with the set-up that was recorded; empty where there is neither."""
+    came; empty where they are as recorded."""
 
 
 def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
@@ -252,7 +251,6 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     if stored is not None:
         # Its clocks are its own, and commands need none.
         recording, notes = mended_source(stored, robot, given, -1)
-        notes = ' '.join([notes, *left_behind(stored.known + stored.found)]).strip()
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     share = None
     if model.posterior is not None:

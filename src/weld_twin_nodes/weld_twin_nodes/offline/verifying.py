@@ -257,7 +257,9 @@ class _Seen:
         if recording.measured is None:
             raise DataError(f'{recording.name} holds no measured poses or points')
         frames = frames_named(align, '--align')
-        causes = tuple(of_the_robot([e for e in model.found if e.traits.cause]))
+        causes = tuple(
+            of_the_robot([e for e in model.found if e.traits.cause and not e.traits.of_setup])
+        )
         own = replace(model, bases=(model.bases[setup],), found=causes, changes=(), given=())
         problem = Problem((usable(recording),), frames)
         start = own.with_found(())

@@ -85,12 +85,15 @@ def _left(model: Model) -> tuple[Effect, ...]:
 
 
 def _constants(model: Model) -> Model:
-    """Return the model with what a robot file holds, and how the recordings' set-ups differ."""
-    remaining = {id(effect) for effect in _left(model)}
+    """
+    Return the model with what a robot file holds, and how the recordings' set-ups differ.
+
+    A file has what slipped as it is afterwards; before that the recordings are without.
+    """
     held = tuple(
         effect
-        for effect in of_the_robot(model.known + model.found)
-        if id(effect) not in remaining and isinstance(effect, ChannelError | FrameError)
+        for effect in model.known + model.found
+        if isinstance(effect, ChannelError | FrameError) and effect.twin.lasting() is not None
     )
     return replace(model, known=(), found=held)
 
@@ -139,4 +142,4 @@ def _changes(constants: Model, own: Model) -> tuple[Effect, ...]:
         moved = frames.get(str(kind.traits.fitted_with))
         if issubclass(kind, FrameError) and moved is not None and np.abs(moved).max() > 0.0:
             out.append(kind(xyz=moved[:3], rotvec=moved[3:]))
-    return tuple(out)
+    return of_the_robot(out)

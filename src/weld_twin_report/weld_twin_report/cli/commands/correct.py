@@ -17,7 +17,12 @@ from weld_twin_msgs_py.programs.source import read_source
 from weld_twin_nodes.cli.given import Given, inputs_of, quantity, refuse_changed, say_doubts
 from weld_twin_nodes.cli.options import PROGRAM, TOPICS
 from weld_twin_nodes.cli.parsing import names_of
-from weld_twin_nodes.offline.given_twin import changed_robot, diagnosis_of, other_readings
+from weld_twin_nodes.offline.given_twin import (
+    changed_robot,
+    diagnosis_of,
+    left_behind,
+    other_readings,
+)
 
 from . import OF_PROGRAM
 
@@ -146,7 +151,7 @@ def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content) + changed_robot(content, given.robot)
-    entry['notes'] += correcting.left_to_mend(robot, given.model)
+    entry['notes'] += left_behind(content, model.effects)
     if given.tolerance:
         tolerance = _length(given.tolerance, '--tolerance')
         noise = _length(given.noise or NOISE, '--noise')

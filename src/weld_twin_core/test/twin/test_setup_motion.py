@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What belongs to a set-up stays with it; what belongs to the arm goes along."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
+from weld_twin_core.diagnosis.unseen.held_out_shrink import _for_bag
+from weld_twin_core.effects import ToolPose, ToolSlip, effect_from_mapping
 from weld_twin_core.effects.dated import in_use, of_the_robot, seen_from
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 
 SECOND = 1_000_000_000
@@ -49,6 +53,23 @@ def test_another_day_sees_the_arm_alone(first):
     whole, other = stations(0, 100), stations(first, 20)
     carried = seen_from(EFFECTS, whole.epoch_ns, whole.span_ns, other)
     assert carried == of_the_robot(EFFECTS) == EFFECTS[:1]
+
+
+@pytest.mark.parametrize('slipped', ['before', 'after', 'in it'])
+@pytest.mark.parametrize('epoch', [0, 5000])
+def test_a_held_out_recording_without_a_date_has_the_slip_where_it_was(slipped, epoch):
+    """Tables and simulated time begin at zero again, whenever they were recorded."""
+    slip = ToolSlip(xyz=[1e-3, 0.0, 0.0], time=50.0)
+    there = {'before': ToolPose(slip.xyz), 'after': ToolPose(), 'in it': replace(slip, time=10.0)}
+    # A part of the one diagnosed has the slip at its own stamps; nothing tells it of another.
+    first = 40 if slipped == 'in it' else epoch
+    other = stations(first, 20)
+    seen = Twin(ROBOT, [there[slipped]]).poses(other)
+    measured = other.with_measured(Measurements(other.joints.t, seen.position))
+    problem = Problem((usable(measured),), frozenset())
+    model = Model(ROBOT, (ROBOT.T_world_base,), found=(slip,))
+    own = _for_bag(problem, model, (stations(0, 100),), 1.0)
+    assert np.abs(problem.residuals(own)[0][:3]).max() < 1e-9
 
 
 DATE = 1_700_000_000

@@ -291,6 +291,22 @@ def seen_from(
     return in_use(effects, epoch_ns, span_ns, other, same=_overlap(span_ns, other))[0]
 
 
+def ways_seen(
+    effects: Sequence[Effect], epoch_ns: int, span_ns: tuple[int, int], other: Recording
+) -> list[tuple[Effect, ...]]:
+    """
+    Return every way in which effects may act in another recording; see `seen_from`, which is first.
+
+    Clocks that start anew with each recording do not tell whether it was before what slipped, after
+    it, or is a part of the recording in which it did.
+    """
+    ways = [seen_from(effects, epoch_ns, span_ns, other)]
+    if _dated(epoch_ns, other) or not any(isinstance(effect, Sudden) for effect in effects):
+        return ways
+    before = [effect for effect in effects if not isinstance(effect, Sudden)]
+    return [*ways, of_the_robot(effects), of_the_robot(before)]
+
+
 def in_use(
     effects: Sequence[Effect],
     epoch_ns: int,

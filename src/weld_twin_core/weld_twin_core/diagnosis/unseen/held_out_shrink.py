@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...effects.dated import of_the_robot, seen_from
+from ...effects.dated import ways_seen
 from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.independent_rows import FEWEST
@@ -177,20 +177,17 @@ def _for_bag(
     """Return the model with the base whose set-up the bag matches, or the bag's own."""
     recording = problem.recordings[0]
     choices = [
-        Model(
-            model.robot,
-            (base,),
-            model.known + model.changed(k),
-            seen_from(model.found, own.epoch_ns, own.span_ns, recording),
-        )
+        Model(model.robot, (base,), model.known + model.changed(k), found)
         for k, (base, own) in enumerate(zip(model.bases, recordings, strict=True))
+        for found in ways_seen(model.found, own.epoch_ns, own.span_ns, recording)
     ]
     sizes = [_size(problem, choice) for choice in choices]
     best = choices[int(np.argmin(sizes))]
     if 'base' in problem.align:
         bare = best.with_found(())
         frames = fit(problem, bare, problem.unit_scale()).model
-        own = Model(model.robot, frames.bases, model.known, of_the_robot(model.found))
+        lasting = tuple(effect for effect in best.found if not effect.traits.of_setup)
+        own = Model(model.robot, frames.bases, model.known, lasting)
         if min(sizes) > other_setup * _size(problem, own):
             return own
     return best

@@ -90,3 +90,17 @@ def test_wide_play_that_the_load_moves_leaves_no_curve_for_springs_of_its_joint(
     (found,) = diagnose(measured, robot, exclude=springs, experiment=False).effects
     assert found.effect.site == 'shoulder_lift_joint'
     assert found.effect.width == pytest.approx(2.2e-3, rel=0.01)
+
+
+@pytest.mark.parametrize('kind', ['joint_compliance', 'loaded_play'])
+def test_a_joint_at_rest_gives_way_as_others_change_its_load(kind):
+    robot, t = load('ur5'), np.arange(0.0, 20.0, 0.02)
+    q = np.tile(HOME[:6], (t.size, 1))
+    q[:, 1] += 1.2 * np.sin(0.5 * t)
+    run = Recording('swing', JointMotion(t, q))
+    sizes = {'joint_compliance': {'compliance': 3e-5}, 'loaded_play': {'width': 2e-3}}
+    true = effect(kind, joint='elbow_joint', **sizes[kind])
+    seen = Twin(robot, [true]).poses(run).position
+    seen = seen + np.random.default_rng(5).normal(scale=2e-5, size=seen.shape)
+    found = diagnose(run.with_measured(Measurements(t, seen)), robot, experiment=False)
+    assert [(e.effect.name, e.effect.joint) for e in found.effects] == [(kind, 'elbow_joint')]

@@ -82,15 +82,6 @@ class _Twin(TwinHooks):
         return LOAD_OF_EFFORT.get(self.effect.statics, 0.0)
 
 
-class _Search(SearchHooks):
-    effect: JointCompliance
-
-    @property
-    def moved_by(self) -> str | None:
-        """Return the joint that must move for it to be seen: none where its load is measured."""
-        return None if self.effect.twin.by_effort else self.effect.joint
-
-
 @register
 class JointCompliance(LinearEffect):
     """The joint yields to the load torque of links, payload and tool wrench; above zero it sags."""
@@ -130,7 +121,6 @@ class JointCompliance(LinearEffect):
     needs = frozenset({'load'})
     options = ('statics',)
     twin = Hooked(_Twin)
-    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

@@ -30,9 +30,11 @@ from .negligible import EMPTY, SLIGHT
 from .problem import LEVER, Site
 
 STILL = 0.04
-"""Travel [rad] below which a joint stands still: a scale of 0.1 % moves by 0.04 mrad over it."""
+"""Travel [rad] below which a joint stands still: a `SCALE` error moves by 0.04 mrad over it."""
 STILL_SLIDE = 2e-3
 """The same for a joint that slides, [m]."""
+SCALE = 1e-3
+"""Error of a scale that is taken for large; so much of `STILL` is what a load has to move, too."""
 WIDE = 0.5
 """Travel [rad, m], or half of all that there is, from which on a joint shows well how something
 depends on its angle."""
@@ -43,13 +45,23 @@ SEED = 1
 """Of the postures: any generic set gives the same answer."""
 
 
-def hardly_moves(features: list[Features], effect: Effect) -> bool:
+def hardly_moves(features: Sequence[Features], effect: Effect) -> bool:
+    """
+    Return whether a joint that an effect needs in motion is at rest, and its load with it.
+
+    A joint at rest bears another load wherever others move its links, and gives way as that changes.
+    """
     if effect.search.moved_by is None:
         return False
     robot = features[0].twin.robot
     i = robot.index(effect.search.moved_by)
-    travel = max(m.reach[1][i] for m in features) - min(m.reach[0][i] for m in features)
-    return bool(travel < (STILL_SLIDE if robot.prismatic[i] else STILL))
+    least = STILL_SLIDE if robot.prismatic[i] else STILL
+    if max(m.reach[1][i] for m in features) - min(m.reach[0][i] for m in features) >= least:
+        return False
+    if effect.on != 'load':
+        return True
+    by_load = np.concatenate([maker.shifts(effect)[0]['q', i] for maker in features])
+    return bool(np.ptp(by_load) * effect.fit.coordinate_scales()[0] < SCALE * least)
 
 
 def lacking(features: Sequence[Features], kind: type[Effect], joint: str | None) -> str | None:

@@ -52,9 +52,9 @@ def _hardly(case: Case) -> Iterator[Finding]:
     ]
     if names:
         yield note(
-            f'{listed(names)} hardly move{"s" if len(names) == 1 else ""}; gear, play, ripple and '
-            'spring of such a joint cannot be seen, and its offset looks like one of its '
-            'neighbours or of a frame.'
+            f'{listed(names)} hardly move{"s" if len(names) == 1 else ""}; gear, play and ripple of '
+            'such a joint cannot be seen, its spring only where its load changes, and its offset '
+            'looks like one of its neighbours or of a frame.'
         )
 
 

@@ -71,6 +71,38 @@ def test_geometric_errors_are_closed(robot):
     assert result.rms[0] > 1e-3
 
 
+@pytest.mark.parametrize(
+    ('name', 'still', 'most'),
+    [
+        ('ur5', [0.3, -1.2, 1.5, -1.0, 0.0, 0.4], 0.3),
+        ('kuka_kr6_r900', [0.3, -1.2, 1.5, 0.4, 0.0, 0.2], 0.01),
+    ],
+)
+def test_beside_a_singular_wrist_the_tool_is_where_it_should_be_and_no_joint_jumps(
+    name, still, most
+):
+    """Three joints place the tool; only a part of its turn is out of reach."""
+    arm = load(name)
+    bent = np.array([3e-3, 1e-3, 5e-4, 1e-4, 1e-5, 0.0])
+    q = np.array(still) + np.outer(bent, np.eye(6)[4])
+    recording = Recording('wrist', JointMotion(np.arange(6.0), q, static=True))
+    j = arm.joint_names
+    acting = effects(
+        arm,
+        {'effect': 'link_twist', 'joint': j[2], 'dalpha': 5e-4},
+        {'effect': 'joint_offset', 'joint': j[1], 'offset': -5e-4},
+        {'effect': 'joint_offset', 'joint': j[3], 'offset': 8e-4},
+        {'effect': 'tool_pose', 'xyz': [3e-4, 2e-4, 0.0], 'rotvec': [5e-4, -4e-4, 3e-4]},
+    )
+    found = compensate(arm, acting, recording)
+    (way, turn), (left, askew) = (
+        (np.linalg.norm(part, axis=1) for part in np.split(each, 2, axis=1))
+        for each in (found.before, found.after)
+    )
+    assert np.all(left < 0.03 * way) and np.all(askew < turn)
+    assert np.abs(found.motion.q - q).max() < most
+
+
 def test_a_gear_error_is_compensated_in_position_and_speed():
     robot = load('ur5')
     gear = {'effect': 'gear_ratio', 'joint': 'shoulder_pan_joint', 'scale': 1e-3}

@@ -34,8 +34,14 @@ _CLOSED = 1e-12
 """Error [m, rad] that is rounding; nothing is left to correct."""
 _LEAST_SHARE = 1e-3
 """Share of a step below which no shorter one is tried: the sample stays as it is."""
-_SINGULAR = 1e-9
-"""Damping of a step [m^2]: invisible but within some tens of micrometres of a singularity."""
+TORCH = 0.1
+"""Distance [m] at which a turn of the tool is compared with a shift: a marker's, a torch's."""
+_METRES = np.repeat([1.0, TORCH], 3)
+"""What is missing to a pose, (6,) [m, rad], counts in metres by this [1, m/rad]."""
+_SINGULAR = 1e-6
+"""Damping of a step [m^2]: joints hardly turn where a radian of them moves the tool by less than a
+millimetre. Undamped, those of a singular wrist turn by 0.7 rad after a milliradian that is out of reach,
+and leave the tool farther off than it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,16 +164,22 @@ def _solved(real: Twin, recording: Recording, goal: Array, rounds: int) -> Array
         live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
         if not live.any():
             break
-        step = least_step(chain_jacobian(real.robot, frames(real.robot, q)), error, _SINGULAR)
+        step = least_command(chain_jacobian(real.robot, frames(real.robot, q)), error)
         trial = replace(recording, joints=_commands(motion, q + share * step))
         remaining = missing(goal, real.poses(trial).matrices)
-        helps = np.linalg.norm(remaining, axis=1) < np.linalg.norm(error, axis=1)
+        sizes = (np.linalg.norm(each * _METRES, axis=1) for each in (remaining, error))
+        helps = np.less(*sizes)
         if coupled:
             helps[:] = rms_of(remaining) < rms_of(error)
         q = np.where(helps[:, None], trial.joints.q, q)
         error = np.where(helps[:, None], remaining, error)
         share = np.where(helps[:, None], share, 0.5 * share)
     return np.asarray(q)
+
+
+def least_command(slope: Array, error: Array) -> Array:
+    """Return steps of joints (..., n) towards poses missed by (..., 6), small beside a singularity."""
+    return least_step(slope * _METRES[:, None], error * _METRES, _SINGULAR)
 
 
 def _commands(nominal: JointMotion, q: Array) -> JointMotion:

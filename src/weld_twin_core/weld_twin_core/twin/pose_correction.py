@@ -24,7 +24,7 @@ from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected
 from .posterior import pose_covariances
-from .program_correction import SINGULAR, too_large
+from .program_correction import too_large
 from .program_model import ProgramModel
 
 _ROUNDS = 12
@@ -34,6 +34,8 @@ _SIDE = 1e-4
 1e-8, and nearly the same for both arms, whose difference counts; rounding is below 1e-11."""
 _SETTLED = 1e-6
 """Step [rad or m] of all joints that is the last one: it leaves its square."""
+_SINGULAR = 1e-9
+"""Damping of a joint step [m^2]: invisible but within micrometres of a singularity."""
 _CLOSED = 1e-11
 """Error [m, rad] that the last step may leave to first order."""
 _OPEN = 1e-9
@@ -119,7 +121,7 @@ class PoseCorrection:
             real = self._real_poses(beside)
             error, rise = between(real[0], pose), _rise(real)
             size = np.abs(error).max()
-            step = least_step(rise, error, SINGULAR)
+            step = least_step(rise, error, _SINGULAR)
             q = q + step
             remaining = np.abs(error - rise @ step).max()
             if remaining < _CLOSED and np.abs(step).max() < _SETTLED:
@@ -127,7 +129,7 @@ class PoseCorrection:
         else:
             if not size < _OPEN:
                 raise DataError('the pose cannot be reached from where the arm stands')
-        back = least_step(rise, np.eye(6), SINGULAR).T
+        back = least_step(rise, np.eye(6), _SINGULAR).T
         apart = _rise(forward(self._arm, beside)) - rise
         added = between(pose, self.arm_pose(q))
         return Looked(pose, np.concatenate([added, q]), np.concatenate([apart @ back, back]))

@@ -28,18 +28,15 @@ from ..arm.rotation import missing
 from ..arm.rotation import moved as displaced
 from ..arrays import Array
 from ..errors import DataError, PathError
-from ..motion.inverse.newton import least_step
 from ..motion.programs import Move, MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.travel import finer, refined, repeated, unrelenting
 from ..recording import JointMotion
-from .compensation import beyond_limits
+from .compensation import beyond_limits, least_command
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
 
 _ROUNDS = 5
 """Rounds of moving points; effects are small, each takes away all but some thousandths."""
-SINGULAR = 1e-9
-"""Damping of a joint step [m^2]: invisible but within micrometres of a singularity."""
 _APART = (2e-4, 2e-3)
 """Two uses of one point may want corrections this far apart [m, rad]; the mean serves both."""
 BETTER = 0.8
@@ -208,7 +205,7 @@ class _Work(NamedTuple):
                     jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
                     step = np.zeros(arm.n)  # external axes go where they went
                     own = slice(moved.external, None)
-                    step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
+                    step[own] = least_command(jacobian[:, own], gap[at])
                 else:
                     step = _own(moved.place(use), use, point, gap[at])
                 yield use.point, step

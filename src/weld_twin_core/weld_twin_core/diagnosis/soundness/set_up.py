@@ -20,6 +20,7 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.dated import InstrumentKnock
 from ...effects.geometry import ToolPose
+from ...twin.compensation import TORCH
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
 from .lengths import capital, falls, length, listed, middle_of_each
@@ -28,9 +29,6 @@ from .mending import differing
 from .slips import TAKEN_UP, Settling, Slip
 from .snapshot import Arm, Snapshot
 from .suspicions import conventions, suspicions
-
-TORCH = 0.1
-"""Distance [m] at which a turn of the tool is compared with a shift: a marker's, a torch's."""
 
 
 def setup(case: Case) -> Sequence[Finding]:

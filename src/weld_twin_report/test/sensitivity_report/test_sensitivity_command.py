@@ -5,58 +5,32 @@
 import csv
 import json
 import re
-from contextlib import redirect_stdout
-from io import StringIO
 
 import pytest
+from command_line import done, refused
 
-from weld_twin_nodes.cli import main
-
-SMALL = [
-    '--samples',
-    '32',
-    '--runs',
-    '200',
-    '--trajectories',
-    '2',
-    '--placements',
-    '2',
-    '--points',
-    '40',
-    '--workers',
-    '1',
-]
+SMALL = ('--samples', 32, '--runs', 200, '--trajectories', 2, '--placements', 2, '--points', 40)
 
 
-@pytest.fixture(scope='module')
-def two_effects(tmp_path_factory):
-    """Return the path of a tolerance file."""
-    path = tmp_path_factory.mktemp('asked') / 'tolerances.yaml'
-    path.write_text('- {effect: joint_offset, std: 3e-4}\n- {effect: link_length, std: 1e-4}\n')
-    return str(path)
-
-
-def test_a_recorded_motion_is_drawn_and_its_bag_says_of_which_robot(tmp_path, capsys):
-    effects = tmp_path / 'effects.yaml'
+def test_a_recorded_motion_is_drawn_and_its_bag_says_of_which_robot(tmp_path):
+    effects, bag, out = tmp_path / 'effects.yaml', tmp_path / 'bag', tmp_path / 'out'
     effects.write_text('- {effect: joint_offset, joint: elbow_joint, offset: 1e-3}\n')
-    bag, out = str(tmp_path / 'bag'), tmp_path / 'out'
-    words = ['--robot', 'ur5', '--effects', str(effects), '--rate', '50', '--out', bag]
-    assert main(['simulate', *words]) == 0
-    most = float(re.search(r'max ([\d.]+) mm', capsys.readouterr().out)[1])
-    assert main(['sensitivity', bag, '--figure', 'recorded', '--out', str(out)]) == 0
+    words = ('--robot', 'ur5', '--effects', effects, '--rate', 50, '--out', bag)
+    most = float(re.search(r'max ([\d.]+) mm', done('simulate', *words))[1])
+    done('sensitivity', bag, '--figure', 'recorded', '--out', out)
     with (out / 'figures' / 'figure-recorded.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert max(float(row['recorded_m']) for row in rows) == pytest.approx(1e-3 * most, rel=1e-3)
 
 
 @pytest.fixture(scope='module')
-def studied(tmp_path_factory, two_effects):
-    """Return the directory of a small study, and what was printed."""
-    out = tmp_path_factory.mktemp('study') / 'out'
-    words = ['sensitivity', '--robot', 'ur5', '--out', str(out), '--tolerances', two_effects]
-    with redirect_stdout(StringIO()) as told:
-        assert main([*words, *SMALL]) == 0
-    return out, told.getvalue()
+def studied(tmp_path_factory):
+    """Return the directory of a small study of two effects, and what was printed."""
+    place = tmp_path_factory.mktemp('study')
+    asked, out = place / 'tolerances.yaml', place / 'out'
+    asked.write_text('- {effect: joint_offset, std: 3e-4}\n- {effect: link_length, std: 1e-4}\n')
+    words = ('--robot', 'ur5', '--tolerances', asked, *SMALL, '--workers', 1)
+    return out, done('sensitivity', *words, '--out', out)
 
 
 @pytest.mark.slow
@@ -81,21 +55,17 @@ def test_one_command_writes_figures_indices_and_a_page(studied):
     assert others and min(others) < given
     for expected in others:
         assert f'{100.0 - 100.0 * expected / given:.1f} %' in page
-    assert {row['motion'] for row in csv.DictReader((out / 'indices.csv').open())} == {
-        'smooth',
-        'aggressive',
-    }
+    rows = csv.DictReader((out / 'indices.csv').open())
+    assert {row['motion'] for row in rows} == {'smooth', 'aggressive'}
 
 
 def test_one_figure_is_drawn_alone_and_alike_every_time(tmp_path):
     texts = []
     for name in ('a', 'b'):
         out = tmp_path / name
-        assert main(['sensitivity', '--robot', 'ur5', '--figure', '12', '--out', str(out)]) == 0
-        assert sorted(p.name for p in (out / 'figures').iterdir()) == [
-            'figure-12.csv',
-            'figure-12.svg',
-        ]
+        done('sensitivity', '--robot', 'ur5', '--figure', '12', '--out', out)
+        names = sorted(p.name for p in (out / 'figures').iterdir())
+        assert names == ['figure-12.csv', 'figure-12.svg']
         texts.append((out / 'figures' / 'figure-12.svg').read_text())
     assert texts[0] == texts[1]
 
@@ -112,15 +82,12 @@ def test_one_figure_is_drawn_alone_and_alike_every_time(tmp_path):
         (['--robot', 'ur5', '--tolerances', 'nowhere.yaml'], 'nowhere.yaml'),
     ],
 )
-def test_a_wrong_question_is_one_line_and_code_two(tmp_path, capsys, words, message):
-    assert main(['sensitivity', *words, '--out', str(tmp_path / 'out')]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count('\n') == 1
+def test_a_wrong_question_is_one_line_and_code_two(tmp_path, words, message):
+    assert message in refused('sensitivity', *words, '--out', tmp_path / 'out')
 
 
-def test_a_directory_of_something_else_is_left_alone(tmp_path, capsys):
+def test_a_directory_of_something_else_is_left_alone(tmp_path):
     (tmp_path / 'thesis.tex').write_text('')
-    assert main(['sensitivity', '--robot', 'ur5', '--out', str(tmp_path)]) == 2
-    assert 'holds something else' in capsys.readouterr().err
+    said = refused('sensitivity', '--robot', 'ur5', '--out', tmp_path)
+    assert 'holds something else' in said
     assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']

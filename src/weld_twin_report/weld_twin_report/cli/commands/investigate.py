@@ -81,12 +81,15 @@ def _planned(given: Given) -> int:
     if given.region and not given.model:
         raise DataError('--region says where a fitted model is to be sure; give it with --model')
     robot, tolerance = given.load_robot(), given.tolerance * 1e-3
+    # Without a controller the table counts as the model does, which this one's language does too.
+    language, model = given.controller or 'csv', given.model if given.controller else None
+    context = given.program_context(robot, language, model) if given.out else None
     plan = (_more if given.model else _first)(given, robot, tolerance)
     print('\n'.join(plan_table(plan, tolerance)))
     if not given.controller:  # its program says so
         print(*(f'note: {note}\n' for note in without_limits(robot)), sep='', end='')
-    if given.out:
-        _write_plan(given, robot, plan)
+    if context is not None:
+        _write_plan(given, robot, context, plan)
     return 0
 
 
@@ -147,12 +150,9 @@ def _in_region(given: Given, robot: Robot) -> tuple[Array, Array]:
     return region(robot, given.region, context, language)
 
 
-def _write_plan(given: Given, robot: Robot, plan: Planned) -> None:
+def _write_plan(given: Given, robot: Robot, context: Context, plan: Planned) -> None:
     from weld_twin_nodes.offline.measurement_plan import STATIONS, TABLE, write_plan
 
-    # Without a controller the table counts as the model does, which this one's language does too.
-    language, model = given.controller or 'csv', given.model if given.controller else None
-    context = given.program_context(robot, language, model)
     out, lines = Path(given.out), list[str]()
     with given.output(TABLE) as folder:
         write_plan(folder, context, given.controller or None, plan)

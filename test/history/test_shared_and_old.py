@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A history that many write to, that an older version made, that is damaged, or is none."""
+"""A history in either database: that many write to, of an older version, damaged, or none."""
 
 import json
 import logging
@@ -27,7 +27,7 @@ from weld_twin_report.history import Database, Unavailable
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
 BAG = Path(__file__).parents[2] / 'bags/elbow_play'
-WRITERS = 6
+WRITERS = 4
 
 
 @pytest.fixture(scope='module')
@@ -45,11 +45,6 @@ def url(request, tmp_path):
     if request.param == 'sqlite':
         return str(tmp_path / 'history.db')
     return request.getfixturevalue('postgresql')
-
-
-@pytest.fixture(scope='module')
-def diagnosed(elbow_found):
-    return elbow_found
 
 
 def copies(diagnosed, place, count):
@@ -82,8 +77,44 @@ def at_once(work, count):
     return [out[k] for k in range(count)]
 
 
-def test_all_who_add_at_once_to_a_database_that_is_new_are_heard(url, diagnosed, tmp_path):
-    files = copies(diagnosed, tmp_path, WRITERS)
+def odd_entries():
+    """Return weeks of an arm whose elbow has stepped, with values that a database may bend."""
+    effect = {'effect': 'backlash', 'joint': "elbow's \u0416\U0001f600", 'std': {'width': 1e-9}}
+    for week, entry in enumerate(made(1, 10)):
+        odd = {2: {'confidence': None}, 3: {'gap_m': 5e-324}, 4: {'floor_m': None}}.get(week, {})
+        at = entry.at + timedelta(microseconds=123456)
+        yield replace(entry, at=at, effects=[effect], **{'confidence': 0.1 + 0.2, **odd})
+
+
+def test_both_databases_give_back_what_was_written_and_tell_the_same(postgresql, tmp_path):
+    told = []
+    for url in (postgresql, str(tmp_path / 'history.db')):
+        database = Database(url)
+        for again in (True, False):
+            assert [database.add('line 7', each) for each in odd_entries()] == [again] * 10
+        for back, entry in zip(database.entries('line 7'), odd_entries(), strict=True):
+            for name in ('value', 'prior_std', 'covariance', 'tool'):
+                np.testing.assert_array_equal(getattr(back, name), getattr(entry, name))
+            for name in ('at', 'recording', 'confidence', 'gap_m', 'floor_m', 'effects', 'names'):
+                assert getattr(back, name) == getattr(entry, name)
+        database.close()
+        words = ('history', 'changed', '--cell', 'line 7', '--db', url, '--json')
+        told.append(json.loads(done(*words)))
+    assert told[0] == told[1]
+    (change,) = told[0]['changes']
+    assert (change['coordinate'], change['date']) == ('joint_offset elbow_joint 0', '2025-02-10')
+
+
+def test_a_server_that_is_gone_is_told_in_a_sentence(tmp_path):
+    pytest.importorskip('psycopg', reason='PostgreSQL needs its driver')
+    url = f'postgresql+psycopg://weld:secret@/postgres?host={tmp_path}'
+    said = refused('history', 'show', '--db', url)
+    assert 'cannot be used' in said and 'No such file or directory' in said
+    assert 'secret' not in said
+
+
+def test_all_who_add_at_once_to_a_database_that_is_new_are_heard(url, elbow_found, tmp_path):
+    files = copies(elbow_found, tmp_path, WRITERS)
 
     def add(k):
         words = ['--cell', 'line 1', '--at', f'2026-03-{k + 1:02d}', '--db', url]
@@ -228,10 +259,10 @@ def test_reading_makes_nothing_and_another_application_is_left_alone(tmp_path):
 
 @pytest.mark.parametrize('version', ['first', b'1', 1.5])
 def test_a_version_that_is_no_number_is_a_sentence_for_who_writes_too(
-    diagnosed, tmp_path, version
+    elbow_found, tmp_path, version
 ):
     db = tmp_path / 'history.db'
-    add = ('history', 'add', diagnosed, '--cell', 'a', '--at', '2026-03-02', '--db', db)
+    add = ('history', 'add', elbow_found, '--cell', 'a', '--at', '2026-03-02', '--db', db)
     with sqlite3.connect(db) as connection:
         for name in ('cells', 'verdicts', 'runs', 'findings', 'about'):
             connection.execute(f'create table {name} (version)')
@@ -242,12 +273,13 @@ def test_a_version_that_is_no_number_is_a_sentence_for_who_writes_too(
     assert db.read_bytes() == before
 
 
-@pytest.mark.parametrize('name', ['', '  ', 'a\nb', 'x' * 201])
-def test_a_cell_that_no_page_could_show_is_not_made(url, diagnosed, name):
-    said = refused('history', 'add', diagnosed, '--cell', name, '--at', '2026-03-02', '--db', url)
-    assert 'is no name of a cell' in said
-    database = Database(url)
-    assert name not in database.cells()
+def test_a_cell_that_no_page_could_show_is_not_made(elbow_found, tmp_path):
+    db = tmp_path / 'history.db'
+    for name in ('', '  ', 'a\nb', 'x' * 201):
+        words = ('--cell', name, '--at', '2026-03-02', '--db', db)
+        assert 'is no name of a cell' in refused('history', 'add', elbow_found, *words)
+    database = Database(str(db))
+    assert not database.cells()
     database.close()
 
 
@@ -271,7 +303,7 @@ def test_a_damaged_row_ends_one_cell_and_not_the_page_of_all(tmp_path):
     done('history', 'show', '--cell', 'line 002', '--db', db)
 
 
-def test_a_history_that_may_only_be_read_is_read_and_says_so_to_who_writes(diagnosed, tmp_path):
+def test_a_history_that_may_only_be_read_is_read_and_says_so_to_who_writes(elbow_found, tmp_path):
     db = tmp_path / 'fleet.db'
     database = Database(str(db))
     fill(database, 2, 4)
@@ -280,7 +312,7 @@ def test_a_history_that_may_only_be_read_is_read_and_says_so_to_who_writes(diagn
     url = f'sqlite:///file:{db}?mode=ro&uri=true'
     done('history', 'page', '--db', url, '--out', tmp_path / 'pages')
     words = ('--cell', 'a', '--at', '2026-03-02', '--db', url)
-    assert 'readonly' in refused('history', 'add', diagnosed, *words)
+    assert 'readonly' in refused('history', 'add', elbow_found, *words)
     assert db.read_bytes() == before
 
 
@@ -308,9 +340,9 @@ def test_who_writes_waits_for_a_lock_on_a_server_no_longer_than_his_patience(pos
         (lambda row, k: row.__setitem__(k, 1e999), 'not finite'),
     ],
 )
-def test_an_impossible_covariance_is_refused_at_the_door(diagnosed, tmp_path, spoil, said):
+def test_an_impossible_covariance_is_refused_at_the_door(elbow_found, tmp_path, spoil, said):
     out = tmp_path / 'spoilt'
-    shutil.copytree(diagnosed, out)
+    shutil.copytree(elbow_found, out)
     data = json.loads((out / 'diagnosis.json').read_text())
     named = [each['name'] for each in data['posterior']['coordinates']]
     place = named.index('backlash elbow_joint 0')
@@ -320,7 +352,7 @@ def test_an_impossible_covariance_is_refused_at_the_door(diagnosed, tmp_path, sp
     told = refused('history', 'add', out, '--cell', 'a', '--at', '2026-03-02', '--db', db)
     assert 'cannot be right' in told and said in told
     assert not db.exists()
-    done('history', 'add', diagnosed, '--cell', 'a', '--at', '2026-03-02', '--db', db)
+    done('history', 'add', elbow_found, '--cell', 'a', '--at', '2026-03-02', '--db', db)
 
 
 def test_what_is_written_waits_for_a_slow_writer_and_readers_for_nobody(tmp_path):

@@ -10,18 +10,8 @@ from typing import Any
 import numpy as np
 
 INLINE = {'b', 'span', 'strong', 'i', 'a', 'small', 'label', 'em', 'code', 'sub', 'sup', 'abbr'}
-SHOWN = (
-    'style',
-    'hidden',
-    'open',
-    'checked',
-    'href',
-    'width',
-    'height',
-    'd',
-    'points',
-    'transform',
-)
+SHOWN = {'style', 'hidden', 'open', 'checked', 'href', 'width', 'height', 'd', 'points'}
+SHOWN |= {'transform'}
 LONG, NOTHING = 6, 1e-9
 """Items of a list from which on sums stand for them, and a size that is rounding."""
 

@@ -17,13 +17,7 @@ from import_graph import (
 )
 
 LAYERS = layer_table((ROOT / 'docs/architecture.md').read_text(encoding='utf-8'))
-PACKAGES = [
-    'weld_twin_core',
-    'weld_twin_msgs_py',
-    'weld_twin_nodes',
-    'weld_twin_report',
-    'weld_twin_lab',
-]
+PACKAGES = [f'weld_twin_{name}' for name in ('core', 'msgs_py', 'nodes', 'report', 'lab')]
 FILES = module_files(ROOT / 'src')
 
 

@@ -32,37 +32,18 @@ MODULES = {
 }
 """Modules of the distributions that are called otherwise."""
 ROS = {
-    'action_msgs',
-    'ament_index_python',
-    'control_msgs',
-    'diagnostic_msgs',
-    'geometry_msgs',
-    'launch',
-    'launch_ros',
-    'lifecycle_msgs',
-    'rcl_interfaces',
-    'rclpy',
-    'rosgraph_msgs',
-    'rosidl_adapter',
-    'rosidl_generator_c',
-    'rosidl_generator_py',
-    'rosidl_generator_type_description',
-    'rosidl_typesupport_c',
-    'rosidl_typesupport_fastrtps_c',
+    'action_msgs', 'ament_index_python', 'control_msgs', 'diagnostic_msgs', 'geometry_msgs', 'launch',
+    'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'sensor_msgs', 'sros2',
+    'std_srvs', 'rosidl_adapter', 'rosidl_generator_c', 'rosidl_generator_py',
+    'rosidl_generator_type_description', 'rosidl_typesupport_c', 'rosidl_typesupport_fastrtps_c',
     'rosidl_typesupport_introspection_c',
-    'sensor_msgs',
-    'sros2',
-    'std_srvs',
-}
+}  # fmt: skip
 
 
 def setup_keywords(package):
     tree = ast.parse((ROOT / 'src' / package / 'setup.py').read_text())
-    call = next(
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == 'setup'
-    )
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    call = next(each for each in calls if getattr(each.func, 'id', '') == 'setup')
     return {item.arg: item.value for item in call.keywords}
 
 
@@ -88,17 +69,15 @@ def test_package_names_the_project_where_it_lies_and_what_changed(package):
     assert [person.name for person in found.maintainers] == ['weld_twin contributors']
     assert (
         found.urls == []
-    )  # the project has no address of its own yet; one that leads nowhere is none
+    )  # the project has no address of its own; one that leads nowhere is none
     text = (ROOT / 'src' / package / 'CHANGELOG.rst').read_text()
     changelog = changes.get_changelog_from_path(str(ROOT / 'src' / package), package)
     day = changelog.get_date_of_version(found.version).date().isoformat()  # bloom wants one
     assert f'## {found.version} ({day})\n' in (ROOT / 'CHANGELOG.md').read_text()
     assert day == str(yaml.safe_load((ROOT / 'CITATION.cff').read_text())['date-released'])
     assert text.splitlines()[1] == f'Changelog for package {package}'
-    assert (
-        '(https://www.ros.org/reps/rep-2004.html)'
-        in (ROOT / 'src' / package / 'QUALITY_DECLARATION.md').read_text()
-    )
+    declared = (ROOT / 'src' / package / 'QUALITY_DECLARATION.md').read_text()
+    assert '(https://www.ros.org/reps/rep-2004.html)' in declared
 
 
 def test_both_ways_of_installing_have_the_same_programs():

@@ -18,23 +18,17 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.process import MODULES
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = [
-    'weld_twin_core',
-    'weld_twin_lab',
-    'weld_twin_msgs_py',
-    'weld_twin_nodes',
-    'weld_twin_report',
-]
+PACKAGES = [f'weld_twin_{name}' for name in ('core', 'lab', 'msgs_py', 'nodes', 'report')]
 NODES = list(MODULES)
 
 pytestmark = [pytest.mark.slow, pytest.mark.cells]
 
 
-def colcon(folder: Path, *words: str) -> str:
+def colcon(folder: Path, *words: str, log: str = 'log') -> str:
     """Run colcon in a workspace; return what it printed."""
     path = f'{Path(sys.executable).parent}:{os.environ["PATH"]}'
     done = subprocess.run(
-        [sys.executable, '-m', 'colcon', '--log-base', 'log', *words],
+        [sys.executable, '-m', 'colcon', '--log-base', log, *words],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -66,14 +60,8 @@ def sourced(workspace) -> dict[str, str]:
     return dict(item.split('=', 1) for item in out.split('\0') if '=' in item)
 
 
-def test_colcon_finds_exactly_the_five_packages():
-    found = subprocess.run(
-        [sys.executable, '-m', 'colcon', 'list', '--names-only'],
-        cwd=ROOT,
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.split()
+def test_colcon_finds_exactly_the_five_packages(tmp_path):
+    found = colcon(ROOT, 'list', '--names-only', log=str(tmp_path / 'log')).split()
     assert sorted(found) == PACKAGES
 
 
@@ -94,16 +82,11 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
         own = {k: v for k, v in os.environ.items() if k.startswith('ROS_')}
         deviations, started = cell.collect('/deviation'), {}
         for name in NODES:
-            command = [
-                str(installed / 'lib/weld_twin_nodes' / name),
-                '--ros-args',
-                '--params-file',
-                str(config),
-            ]
-            if name == 'recorder':
-                command += ['-p', f'out:={tmp_path / "bag"}']
+            words = ['--ros-args', '--params-file', str(config)]
+            words += ['-p', f'out:={tmp_path / "bag"}'] if name == 'recorder' else []
+            program = str(installed / 'lib/weld_twin_nodes' / name)
             assigned = [f'{k}={v}' for k, v in {**sourced, **own}.items()]
-            started[name] = cell.start(['env', '-i', *assigned, *command])
+            started[name] = cell.start(['env', '-i', *assigned, program, *words])
         cell.wait(
             lambda: set(NODES) <= set(cell.node.get_node_names()), 'the installed nodes', 120.0
         )

@@ -11,9 +11,6 @@ from command_line import refused, weld_twin
 from weld_twin_report.serve.directory import Directory
 from weld_twin_report.serve.job import Asked, Job
 
-for needed in ('fastapi', 'uvicorn', 'multipart', 'sqlalchemy'):
-    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
-
 KEY = 'deadbeef' * 4
 
 

@@ -14,20 +14,10 @@ from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.main import parser_of
 from weld_twin_report.serve.fields import CORRECT, DIAGNOSE, given, sentence, words
 
-for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
-    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
-
 TABLE = b'J1,J2,J3,J4,J5,J6,X,Y,Z\n' + b'0,-90,90,0,90,0,500,0,600\n' * 30
 """Thirty times the same station: read, and refused."""
 HEAD = b'POST /recordings HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n'
 HEAD += b'Content-Type: multipart/form-data; boundary=edge\r\n\r\n--edge\r\n'
-
-
-@pytest.fixture(scope='module')
-def server(tmp_path_factory):
-    made = Server(tmp_path_factory.mktemp('served'))
-    yield made
-    made.kill()
 
 
 def connections(server, count, said=b''):

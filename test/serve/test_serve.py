@@ -10,27 +10,22 @@ from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import done
 from served import Person, Server, fill, small_disk, until
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.bags import read_recording
 from weld_twin_report.history import Database
 from weld_twin_report.serve import Settings
 from weld_twin_report.serve.job import Asked, Job
 from weld_twin_report.serve.queue import Queue
 
-for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
-    pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
-
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 BAG = Path(__file__).parents[2] / 'bags/elbow_play'
-
-
-@pytest.fixture(scope='module')
-def server(tmp_path_factory):
-    made = Server(tmp_path_factory.mktemp('served'))
-    yield made
-    made.kill()
 
 
 def bag_files():
@@ -87,7 +82,8 @@ def test_from_drop_to_sheet_and_into_a_history_of_ones_own(week, chromium, tmp_p
     with browser_of(chromium, tmp_path / 'mine') as page:
         address = monday(page, week)
         assert page.evaluate('document.cookie') == ''  # no script reads a key
-        key = keys_page(page, week)
+        page.goto(week.root + '/me')
+        key = page.locator('#own').inner_text()
     with browser_of(chromium, tmp_path / 'mine') as page:  # the next day, from the bookmark
         the_history_grows(page, week)
         page.goto(week.root + '/recordings')
@@ -134,11 +130,6 @@ def monday(page, week):
     return page.url.removeprefix(week.root)
 
 
-def keys_page(page, week):
-    page.goto(week.root + '/me')
-    return page.locator('#own').inner_text()
-
-
 def dropped(page, week):
     """Drop the recording; return the address it has while it waits."""
     page.goto(week.root)
@@ -182,11 +173,15 @@ def thursday(page, week, address, failed):
         until(page, 'iframe')
 
 
-def friday(page, week, key):
-    """Who has the key goes on elsewhere, deletes one recording, logs out, comes back, deletes all."""
+def go_on_with(page, week, key):
     page.goto(week.root + '/me')
     page.fill('input[name=key]', key)
     page.get_by_role('button', name='Go on with it').click()
+
+
+def friday(page, week, key):
+    """Who has the key goes on elsewhere, deletes one recording, logs out, comes back, deletes all."""
+    go_on_with(page, week, key)
     count = page.locator('#mine tbody tr').count()
     assert count >= 2
     page.get_by_role('button', name='Delete').first.click()
@@ -203,9 +198,7 @@ def friday(page, week, key):
     page.get_by_role('button', name='Log out').click()
     page.goto(week.root + '/recordings')
     assert 'None yet' in page.locator('#mine').inner_text()
-    page.goto(week.root + '/me')
-    page.fill('input[name=key]', key)
-    page.get_by_role('button', name='Go on with it').click()
+    go_on_with(page, week, key)
     page.goto(week.root + '/me')
     page.check('#sure')
     page.get_by_role('button', name='Delete all that is mine').click()
@@ -216,18 +209,10 @@ def friday(page, week, key):
 
 def test_what_the_gate_asks_is_answered_in_the_browser(server, chromium, tmp_path):
     """A table with two joints swapped: the page says so, and one click corrects it."""
-    lines = ['J1,J2,J3,J4,J5,J6,X,Y,Z']
-    import numpy as np
-
-    from weld_twin_core.arm import catalog
-    from weld_twin_core.recording import JointMotion, Recording
-    from weld_twin_core.twin.twin import Twin
-
-    robot = catalog.load('ur5')
-    rng = np.random.default_rng(4)
+    lines, rng = ['J1,J2,J3,J4,J5,J6,X,Y,Z'], np.random.default_rng(4)
     q = np.array([0.3, -1.2, 1.4, -1.0, -1.5, 0.2]) + 0.4 * rng.standard_normal((60, 6))
     t = np.arange(60.0)
-    poses = Twin(robot).poses(Recording('made', JointMotion(t, q, None, True)), t)
+    poses = Twin(load('ur5')).poses(Recording('made', JointMotion(t, q, None, True)), t)
     noise = 2e-5 * rng.standard_normal((60, 3))
     swapped = q[:, [0, 1, 2, 4, 3, 5]]
     for angles, point in zip(np.degrees(swapped), 1e3 * (poses.position + noise), strict=True):
@@ -250,12 +235,7 @@ def test_what_the_gate_asks_is_answered_in_the_browser(server, chromium, tmp_pat
 
 def stretch_of_the_recording(file):
     """Write a program: the motion that was recorded, from one turn of the elbow to the next."""
-    import numpy as np
-
-    from weld_twin_core.arm import catalog
-    from weld_twin_msgs_py.bags import read_recording
-
-    robot = catalog.load('ur5')
+    robot = load('ur5')
     joints = read_recording(BAG, robot).joints
     rows = np.searchsorted(joints.t, joints.t[0] + np.linspace(1.66, 2.14, 8))
     lines = [f'joint_names: [{", ".join(robot.joint_names)}]', 'points:']

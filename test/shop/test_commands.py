@@ -20,11 +20,7 @@ SCREEN = 40
 @pytest.fixture
 def help_of(monkeypatch):
     monkeypatch.setenv('COLUMNS', '80')
-
-    def shown(*words):
-        return done(*words)
-
-    return shown
+    return done
 
 
 def listed(text, title):
@@ -94,16 +90,8 @@ def typed_of_old(place):
     }
 
 
-MADE = (
-    'twin',
-    'better',
-    'robot.json',
-    'a.script',
-    'same/a.script',
-    'plan/stations.yaml',
-    'whole',
-    'policy.xml',
-)
+MADE = ['twin', 'better', 'robot.json', 'a.script', 'same/a.script', 'plan/stations.yaml']
+MADE += ['whole', 'policy.xml']
 
 
 def test_an_old_spelling_does_what_the_new_one_does_and_says_it_once(tmp_path):
@@ -142,13 +130,7 @@ def test_an_option_of_the_other_kind_is_refused_in_one_sentence(tmp_path):
         ('correct', 'a.script', '--joint-topic', '/j'): '--joint-topic is of a bag',
         ('correct', tmp_path): 'say with --model by which effects',
         ('investigate', tmp_path, '--postures', 30): '--postures is of a plan',
-        (
-            'investigate',
-            tmp_path,
-            'bag',
-            '--tolerance',
-            1,
-        ): 'a plan comes before the first recording',
+        ('investigate', tmp_path, 'bag', '--tolerance', 1): 'a plan comes before the first',
     }
     for words, sentence in wrong.items():
         said = refused(*words, *robot)

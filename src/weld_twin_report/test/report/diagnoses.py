@@ -30,17 +30,8 @@ from weld_twin_core.motion.planned_motion import plan
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 
-REGRESSORS = (
-    'constant',
-    'angle, low order',
-    'angle, high order',
-    'reversal',
-    'speed',
-    'acceleration',
-    'load',
-    'temperature',
-    'time',
-)
+REGRESSORS = ('constant', 'angle, low order', 'angle, high order', 'reversal', 'speed')
+REGRESSORS += ('acceleration', 'load', 'temperature', 'time')
 NOISE = 2e-5
 CHECKS = (
     Check('units', 'ok', 'Joint angles are in rad and lengths in m.'),
@@ -149,14 +140,8 @@ def _contributions(robot, found, recordings, lines):
     parts = []
     for r in recordings:
         whole = Twin(robot, found).poses(r, r.measured.t).position
-        parts.append(
-            np.array(
-                [
-                    whole - Twin(robot, found[:k] + found[k + 1 :]).poses(r, r.measured.t).position
-                    for k in range(len(found))
-                ]
-            )
-        )
+        rests = (Twin(robot, found[:k] + found[k + 1 :]) for k in range(len(found)))
+        parts.append(np.array([whole - rest.poses(r, r.measured.t).position for rest in rests]))
     return Contributions(lines.after, tuple(parts))
 
 
@@ -177,23 +162,15 @@ def _where(robot, found, lines, recordings):
     for site in sites[:2]:
         shares[robot.index(site), 3] = 0.9
         shares[robot.index(site), 0] = 0.4
-    joints = sorted(
-        zip(robot.joint_names, shares.max(axis=1).tolist(), strict=True), key=lambda item: -item[1]
-    )
+    largest = zip(robot.joint_names, shares.max(axis=1).tolist(), strict=True)
+    joints = sorted(largest, key=lambda item: -item[1])
     path = []
     for r, b in zip(recordings, lines.before, strict=True):
         for index in np.array_split(np.arange(len(b)), max(1, 12 // len(recordings))):
             t = r.measured.t[index]
             path.append((float(t[0]), float(t[-1]), 0.1, rms([b[index]])))
-    regimes = {
-        'static': 0.1,
-        'reversal': 0.88,
-        'speed': 0.02,
-        'acceleration': 0.0,
-        'load': 0.03,
-        'temperature': 0.0,
-        'time': 0.001,
-    }
+    regimes = {'static': 0.1, 'reversal': 0.88, 'speed': 0.02, 'acceleration': 0.0}
+    regimes |= {'load': 0.03, 'temperature': 0.0, 'time': 0.001}
     direction = {'along_m': 3e-4, 'across_m': 1.1e-4, 'normal_m': 4e-5}
     return Where(
         tuple(joints),
@@ -321,11 +298,5 @@ def nothing():
     return diagnosis('none', robot, [], [], [moving(robot, 'circle', 'smooth')])
 
 
-ALL = {
-    'backlash': backlash,
-    'ambiguous': ambiguous,
-    'unknown': unknown,
-    'calibration': calibration,
-    'circle': circle,
-    'nothing': nothing,
-}
+MADE = (backlash, ambiguous, unknown, calibration, circle, nothing)
+ALL = {make.__name__: make for make in MADE}

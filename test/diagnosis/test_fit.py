@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cells import SIGMA, SIGMA_TURN, effect, errors_of, known_scale, shaken, tiny
+from diagnosis_cells import SIGMA, SIGMA_TURN, effect, errors_of, known_scale, tiny
 from scipy.optimize import least_squares
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from weld_twin_core.diagnosis.algebra.fit import (
     TRUSTED,
@@ -109,41 +109,11 @@ def test_columns_are_the_slopes_of_what_the_twin_predicts(name):
         assert np.linalg.norm(columns[p] - slope) < 0.02 * size[p], p
 
 
-@pytest.mark.parametrize('name', CASES)
-def test_the_truth_lies_within_the_standard_errors(name):
-    problem, scale, start, true = case(name)
-    found = fit(problem, start, scale)
-    off = found.coordinates - np.concatenate([e.fit.coordinates() for e in true])
-    assert (np.abs(off) < 4.0 * errors_of(problem, found.model, scale)).all()
-
-
 def test_a_frame_that_nothing_shows_stays_where_it_is():
     # positions at the flange: the tool's turn about its own origin moves nothing
     problem, model = tiny(align=('tool',), turned=False)
     found = fit(problem, model, known_scale(problem)).model
     np.testing.assert_allclose(found.robot.T_flange_tool[:3, :3], np.eye(3), atol=1e-12)
-
-
-def test_standard_errors_cover_the_truth_in_repeated_measurements():
-    true = (effect('joint_offset', joint='elbow_joint', offset=5e-4),)
-    clean, model = tiny(true, count=25, noise=0.0, align=('base',))
-    rng = np.random.default_rng(11)
-    recording = clean.recordings[0]
-    scores = []
-    for _ in range(30):
-        exact = recording.measured
-        noisy = replace(
-            exact,
-            position=exact.position + rng.normal(scale=SIGMA, size=exact.position.shape),
-            rotation=shaken(exact.rotation, SIGMA_TURN, rng),
-        )
-        problem = Problem((recording.with_measured(noisy),), clean.align)
-        scale = known_scale(problem)
-        found = fit(problem, model.with_found(true), scale, iterations=3)
-        error = float(errors_of(problem, found.model, scale)[0])
-        scores.append((found.coordinates[0] - 5e-4) / error)
-    low, high = chi2.ppf([0.005, 0.995], 30)
-    assert low < float(np.square(scores).sum()) < high
 
 
 def thrown_off(problem, share, size, rng):

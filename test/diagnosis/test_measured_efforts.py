@@ -11,7 +11,6 @@ from command_line import done, refused
 from diagnosis_cells import all_but
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
-from weld_twin_core.diagnosis.soundness.efforts import compared
 from weld_twin_core.diagnosis.soundness.mending import Given, joints_as
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.recording import JointSignal
@@ -157,19 +156,6 @@ def test_a_payload_and_a_sign_show_in_the_efforts(tmp_path):
 def test_efforts_that_are_none_are_refused_in_one_sentence(tmp_path, effort, said):
     assert said in refused(*in_bag(tmp_path, effort))
     assert not (tmp_path / 'found').exists()
-
-
-def test_a_torque_constant_shows_where_all_weights_are_declared():
-    recording = pulled(seed=5, payload=3.0)
-    declared = replace(ROBOT, payload_mass=3.0, payload_com=np.array([0.0, 0.0, 0.1]))
-    wrong = recording.effort.value * (1.0, 1.0, 1.12, 1.0, 1.0, 1.0)
-    told = replace(recording, effort=JointSignal(recording.effort.t, wrong))
-    sound, found = compared([recording], declared), compared([told], declared)
-    assert sound.causes == () and sound.difference < 0.02
-    assert [(cause.name, cause.joint) for cause in found.causes] == [
-        ('torque_constant', 'elbow_joint')
-    ]
-    assert found.causes[0].value == pytest.approx(1.12, abs=0.01)
 
 
 def test_efforts_go_with_joints_that_are_put_right():

@@ -58,7 +58,7 @@ def test_an_effect_whose_fit_has_one_optimum_starts_where_it_is():
 def test_a_joint_at_rest_in_the_first_recording_hides_no_stairs_of_the_second():
     robot, noise = load('ur5'), np.random.default_rng(5)
     stairs = effect('quantization', joint='elbow_joint', step=1.3e-3)
-    t = np.arange(0.0, 20.0, 0.02)
+    t = np.arange(0.0, 12.0, 0.02)
     both = np.array(HOME[:6]) + 0.4 * np.sin(np.outer(t, 0.5 + 0.13 * np.arange(6)))
     still = both.copy()
     still[:, 2] = HOME[2]

@@ -149,7 +149,7 @@ def leaked_into_the_elbow(seed):
 def test_a_staircase_that_stations_chose_says_nothing_of_those_that_did_not():
     """Of thousands of staircases one looks like what another axis leaks into the elbow."""
     ratios = []
-    for seed in range(8):
+    for seed in range(4):
         problem, model, scale = leaked_into_the_elbow(seed)
         found = stairs_of(problem, model, scale)
         unseen = Unseen.of(problem, scale, found, np.zeros(0))
@@ -257,17 +257,6 @@ def test_what_many_samples_do_is_no_outlier():
     assert np.flatnonzero(~kept).tolist() == [0, 1]
     assert not trusted((np.append(0.01, np.ones(29)),))[0][0]
     assert trusted((np.full(7, 0.01),))[0].all()
-
-
-def test_stretches_never_span_two_recordings():
-    first, _ = tiny((), count=30)
-    second, _ = tiny((), seed=1, count=70, turned=False)
-    both = type(first)(first.recordings + second.recordings)
-    labels = both.block_labels(8)
-    ends = 6 * 30
-    assert labels.size == 6 * 30 + 3 * 70
-    assert set(labels[:ends]).isdisjoint(labels[ends:])
-    assert (np.diff(labels) >= 0).all() and np.unique(labels).size == 8
 
 
 def test_what_one_stretch_alone_shows_stays_put_elsewhere():

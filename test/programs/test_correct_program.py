@@ -347,21 +347,6 @@ def test_nothing_within_the_cap_is_an_error_that_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('text', 'line'),
-    [
-        (SEAM.replace('-0.45, -0.20', '-0.45, -0.2.0'), 4),
-        (SEAM.replace('2.31, 0.0], v=0.1)\n  movel', '2.31], v=0.1)\n  movel'), 3),
-        (SEAM.replace('movej([0.1, -1.3', 'movej([0.1, 1e99'), 5),
-        (SEAM.replace('2.5, -1.8, -1.5, 0.0])', '1.5, -1.8, -1.5, 0.0]'), 5),
-    ],
-)
-def test_a_broken_program_is_one_sentence_with_file_and_line(text, line, tmp_path):
-    said = corrected(tmp_path, text)
-    assert said.code == 2
-    assert f'seam.script line {line}:' in said.err and said.err.count('\n') == 1
-
-
-@pytest.mark.parametrize(
     'line',
     [
         '  movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]))',

@@ -622,24 +622,18 @@ def test_joints_of_several_axes_beside_a_trajectory_are_no_second_one():
 
 @pytest.mark.parametrize(
     ('line', 'many'),
-    [('  Foo a,\n', 4_000), ('a ' + 'x , ' * 9 + '\n', 4_000), ('  a{\n', 20_000)],
+    [('  Foo a,\n', 2_000), ('a ' + 'x , ' * 9 + '\n', 2_000), ('  a{\n', 10_000)],
 )
 def test_what_ends_no_statement_is_read_in_the_time_of_other_lines(line, many):
     source = (MADE / 'bracket.mod').read_text().replace('MODULE', line * many + 'MODULE', 1)
     begin = time.process_time()
     read('rapid', (source,))
-    assert time.process_time() - begin < 5.0  # half a second; nine where a statement may go on
+    assert time.process_time() - begin < 1.5  # a quarter; two where a statement may go on
 
 
 def test_places_count_their_lines():
     source = Source('a', 'x\r\ny\n\nz')
     assert [source.line(place) for place in range(7)] == [1, 1, 1, 2, 2, 3, 4]
-
-
-def test_several_trajectories_in_a_file_are_refused():
-    source = (MADE / 'bracket.yaml').read_text()
-    with pytest.raises(TwinError, match='several trajectories'):
-        read('joint-trajectory', (f'{source}\n---\n{source}',))
 
 
 @pytest.mark.parametrize('before', ['\xef\xbb\xbf', '# \xc3\x85land, \x85\n', '\xef\xbb\xbf# a\n'])

@@ -82,9 +82,8 @@ def test_a_tool_that_may_change_and_did_by_millimetres_is_fitted(cell, rng):
     assert changed['recording'] == 1 and turn == pytest.approx(np.radians(24.0), abs=2e-3)
 
 
-@pytest.mark.parametrize(('degrees', 'turns'), [(90.0, True), (8.0, False)])
-def test_a_tool_that_was_changed_without_a_word_is_told_and_fitted(rng, degrees, turns):
-    found = looked(*pair(rng, turned(degrees), turns=turns), apply=True)
+def test_a_tool_that_was_changed_without_a_word_is_told_and_fitted(rng):
+    found = looked(*pair(rng, turned(8.0), turns=False), apply=True)
     assert found.given.may_change == ('tool_pose',) and found.posed is not None
     (item,) = found.unsound
     assert (item.kind, item.at) == ('reflector_jumped', ('tool',))
@@ -282,11 +281,11 @@ def test_links_that_grow_with_the_recorded_temperature_are_no_set_up_that_moved(
 
 
 def test_a_set_up_that_moved_is_told_by_its_station_and_not_by_its_second(rng):
-    made = measured(REAL, 4.8 * np.arange(90), stations(rng, 90), rng, turns=True)
+    made = measured(REAL, 4.8 * np.arange(50), stations(rng, 50), rng, turns=True)
     position = made.measured.position.copy()
-    position[55:] += [0.001, 0.002, -0.001]
+    position[30:] += [0.001, 0.002, -0.001]
     (slip,) = looked(made.with_measured(replace(made.measured, position=position))).slips
-    assert 'station 55 of 90' in slip.sentence(made)
+    assert 'station 30 of 50' in slip.sentence(made)
 
 
 def test_a_chain_of_two_arms_is_said_to_be_one(rng):

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+import yaml
 from small_arm import small_arm
 
 import weld_twin_core as wt
@@ -18,68 +19,40 @@ def said(robot, **entry):
     return actions(effects_from_list([entry], robot), robot)[0]
 
 
-@pytest.mark.parametrize(
-    ('entry', 'parts'),
-    [
-        (
-            {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 4.2e-4},
-            [
-                'At reading X elbow_joint stands at X + 0.0241 deg. To mend: ',
-                'the reading X becomes X + 0.0241 deg.',
-            ],
-        ),
-        (
-            {'effect': 'link_length', 'joint': 'shoulder_lift_joint', 'da': 6e-4},
-            ['a = -424.400 mm', 'in place of -425.000 mm', '+0.600 mm'],
-        ),
-        ({'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': -1e-3}, ['-0.0573 deg']),
-        (
-            {'effect': 'tool_pose', 'xyz': [1e-3, 0.0, -2e-3], 'rotvec': [0.0, 0.01, 0.0]},
-            [
-                'by +1.000 mm along axis x, -2.000 mm along axis z of the flange and '
-                '+0.5730 deg about axis y of the tool;'
-            ],
-        ),
-        (
-            {'effect': 'base_pose', 'xyz': [0.0, 2e-4, 0.0], 'rotvec': [0.0, 0.0, 9e-4]},
-            [
-                'by +0.200 mm along axis y of the measuring frame and +0.0516 deg about axis z of '
-                'the base. If it was right when it was measured'
-            ],
-        ),
-        ({'effect': 'payload', 'mass': 2.1}, ['Enter a payload of 2.10 kg in place of 0.00 kg']),
-        (
-            {'effect': 'backlash', 'joint': 'shoulder_lift_joint', 'width': 5e-4},
-            ['Service the gear of shoulder_lift_joint', 'has 0.0286 deg of'],
-        ),
-        (
-            {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4, 'form': 'coast'},
-            ['elbow_joint always from one side', 'coasts across 0.0286 deg of play', 'ahead'],
-        ),
-        ({'effect': 'time_delay', 'delay': 0.0123}, ['Fix the clock', '12.3 ms late']),
-        ({'effect': 'time_delay', 'delay': -0.0123}, ['12.3 ms early']),
-        ({'effect': 'clock_rate', 'rate': -3e-5}, ['30.0 ppm slow', '0.108 s in an hour']),
-        (
-            {'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 2e-5},
-            ['+0.115 deg under 100 N m', 'a stiffness of 50.0 kN m/rad'],
-        ),
-        ({'effect': 'drift', 'xyz_rate': [1e-6, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']),
-        (
-            {'effect': 'thermal_growth', 'coefficient': 1.2e-5, 'links': ['elbow_joint']},
-            ['+0.0120 mm per m and K for elbow_joint'],
-        ),
-        (
-            {
-                'effect': 'transmission_ripple',
-                'joint': 'elbow_joint',
-                'amplitude': [1e-4, 5e-4],
-                'order': [4.0, 9.0],
-                'phase': [0.0, 1.0],
-            },
-            ['0.029 deg at 9 per turn, 0.0057 deg at 4 per turn'],
-        ),
-    ],
-)
+SAID = yaml.safe_load("""
+- - {effect: joint_offset, joint: elbow_joint, offset: 0.00042}
+  - ['At reading X elbow_joint stands at X + 0.0241 deg. To mend: ', the reading X becomes X +
+    0.0241 deg.]
+- - {effect: link_length, joint: shoulder_lift_joint, da: 0.0006}
+  - [a = -424.400 mm, in place of -425.000 mm, +0.600 mm]
+- [{effect: link_twist, joint: elbow_joint, dalpha: -0.001}, [-0.0573 deg]]
+- - {effect: tool_pose, xyz: [0.001, 0.0, -0.002], rotvec: [0.0, 0.01, 0.0]}
+  - ['by +1.000 mm along axis x, -2.000 mm along axis z of the flange and +0.5730 deg about axis
+    y of the tool;']
+- - {effect: base_pose, xyz: [0.0, 0.0002, 0.0], rotvec: [0.0, 0.0, 0.0009]}
+  - [by +0.200 mm along axis y of the measuring frame and +0.0516 deg about axis z of the base.
+    If it was right when it was measured]
+- [{effect: payload, mass: 2.1}, [Enter a payload of 2.10 kg in place of 0.00 kg]]
+- - {effect: backlash, joint: shoulder_lift_joint, width: 0.0005}
+  - [Service the gear of shoulder_lift_joint, has 0.0286 deg of]
+- - {effect: backlash, joint: elbow_joint, width: 0.0005, form: coast}
+  - [elbow_joint always from one side, coasts across 0.0286 deg of play, ahead]
+- [{effect: time_delay, delay: 0.0123}, [Fix the clock, 12.3 ms late]]
+- [{effect: time_delay, delay: -0.0123}, [12.3 ms early]]
+- [{effect: clock_rate, rate: -3.0e-05}, [30.0 ppm slow, 0.108 s in an hour]]
+- - {effect: joint_compliance, joint: elbow_joint, compliance: 2.0e-05}
+  - [+0.115 deg under 100 N m, a stiffness of 50.0 kN m/rad]
+- [{effect: drift, xyz_rate: [1.0e-06, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']]
+- - {effect: thermal_growth, coefficient: 1.2e-05, links: [elbow_joint]}
+  - [+0.0120 mm per m and K for elbow_joint]
+- - {effect: transmission_ripple, joint: elbow_joint, amplitude: [0.0001, 0.0005], order: [4.0,
+    9.0], phase: [0.0, 1.0]}
+  - ['0.029 deg at 9 per turn, 0.0057 deg at 4 per turn']
+""")
+"""Effects, and parts of what is said of them."""
+
+
+@pytest.mark.parametrize(('entry', 'parts'), SAID)
 def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     sentence = said(ur5, **entry)
     assert all(part in sentence for part in parts), sentence
@@ -114,9 +87,9 @@ def test_errors_of_a_cell_have_sentences_in_mm_and_degrees(ur5):
     assert '0.300 mm of play' in said(cell, effect='backlash', joint='track', width=3e-4)
 
 
-def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
+def test_every_effect_of_the_library_has_a_sentence_of_its_own_without_exponents_but_noise(ur5):
     for name, kind in REGISTRY.items():
-        if name in OF_CELLS:
+        if name in OF_CELLS or not kind.__module__.startswith('weld_twin_core'):
             continue
         where = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         more = {'source': 'wrist_1_joint'} if name == 'joint_coupling' else {}
@@ -125,26 +98,12 @@ def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
             p.name: p.typical if p.size == 1 else [p.typical] * (p.size or 4)
             for p in kind.parameters
         }
-        if kind.__module__.startswith('weld_twin_core') and not name.endswith(('curve', 'noise')):
-            sentence = said(ur5, effect=name, **where, **more, **sizes)
+        for values in ({}, {} if name.endswith(('curve', 'noise')) else sizes):
+            sentence = said(ur5, effect=name, **where, **more, **values)
+            assert sentence.endswith('.') and sentence[0].isupper()
+            assert not where or 'elbow_joint' in sentence
+            assert name == 'measurement_noise' or not sentence.startswith('Put '), name
             assert 'mrad' not in sentence and 'e-0' not in sentence and 'e+0' not in sentence
-
-
-def test_every_effect_of_the_library_has_its_own_sentence_but_noise(ur5):
-    for name, kind in REGISTRY.items():
-        if name in OF_CELLS:
-            continue
-        entry = {'effect': name}
-        if kind.of in ('joint', 'link'):
-            entry['joint'] = 'elbow_joint'
-        if name == 'joint_coupling':
-            entry['source'] = 'wrist_1_joint'
-        sentence = said(ur5, **entry)
-        assert sentence.endswith('.') and sentence[0].isupper()
-        if kind.of in ('joint', 'link'):
-            assert 'elbow_joint' in sentence
-        if name != 'measurement_noise' and kind.__module__.startswith('weld_twin_core'):
-            assert not sentence.startswith('Put '), name
 
 
 @pytest.mark.parametrize(

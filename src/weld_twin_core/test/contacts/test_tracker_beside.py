@@ -16,7 +16,7 @@ from weld_twin_core.motion.inverse.newton import reaching
 
 PINS = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
 EACH = 12
-STATIONS = 40
+STATIONS = 25
 TRACKER, SLACK = 2e-5, 1.5e-4
 OFFSET = 0.002
 GEOMETRY = {'joint_offset', 'link_length', 'link_offset', 'link_twist', 'tool_pose', 'base_pose'}

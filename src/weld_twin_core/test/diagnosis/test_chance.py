@@ -36,11 +36,10 @@ def test_a_sound_arm_at_fifteen_stations_has_nothing_but_noise(seed):
     assert found.posterior.centred(())[0] == ()
 
 
-@pytest.mark.parametrize('times', [15.0, 60.0])
-def test_a_sound_arm_with_four_stray_readings_is_sound_and_they_are_named(times):
+def test_a_sound_arm_with_four_stray_readings_is_sound_and_they_are_named():
     robot, recording = stations(7, count=60)
     points, strays = np.array(recording.measured.position), [3, 17, 40, 58]
-    points[strays] += times * NOISE * np.array([[1, 1, -1], [-1, 1, 1], [1, -1, 1], [1, 1, 1]])
+    points[strays] += 60.0 * NOISE * np.array([[1, 1, -1], [-1, 1, 1], [1, -1, 1], [1, 1, 1]])
     seen = wt.Measurements(recording.joints.t, points)
     told = wt.diagnose(recording.with_measured(seen), robot, align='base,tool', experiment=False)
     assert told.status == 'none'

@@ -235,17 +235,26 @@ def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
     assert sum(share for _, share in told.where.joints) < 0.5 * told.causes[0].share
 
 
-def test_how_a_set_up_moved_is_no_cause_of_its_own():
-    """An instrument whose scale comes and goes is placed over time; nothing moved at an instant."""
-    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(2)
-    t = 20.0 * np.arange(50)
+def at_stations(name, seed, places, *, count=60, noise=3e-5):
+    """Return the diagnosis of stations of an arm; a function tells where its tool really is."""
+    robot, rng = wt.load(name), np.random.default_rng(seed)
+    t = 20.0 * np.arange(count)
     q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
     commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
-    position = wt.Twin(robot).poses(commanded, t).position + [2.1, -1.3, 0.4]
-    position *= (1.0 + 1.2e-4 * np.sin(2.0 * np.pi * t / 900.0))[:, None]
-    position += rng.normal(scale=3e-5, size=position.shape)
-    seen = commanded.with_measured(wt.Measurements(t, position))
-    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    there = places(robot, commanded) + [2.1, -1.3, 0.4]
+    seen = wt.Measurements(t, there + rng.normal(scale=noise, size=there.shape))
+    return wt.diagnose(commanded.with_measured(seen), robot, align='base,tool', experiment=False)
+
+
+def test_how_a_set_up_moved_is_no_cause_of_its_own():
+    """An instrument whose scale comes and goes is placed over time; nothing moved at an instant."""
+
+    def stretched(robot, commanded):
+        still = wt.Twin(robot).poses(commanded).position
+        share = 1.2e-4 * np.sin(2.0 * np.pi * commanded.joints.t / 900.0)[:, None]
+        return still + share * (still + [2.1, -1.3, 0.4])
+
+    found = at_stations('kuka_iiwa14', 2, stretched, count=50)
     assert any(effect.traits.of_setup and not effect.traits.bends for effect in found.model.found)
     (cause,) = found.causes
     assert cause.place[0][0] == 'base' and cause.dependence[0][0] == 'time'
@@ -253,36 +262,26 @@ def test_how_a_set_up_moved_is_no_cause_of_its_own():
 
 
 def test_a_base_that_leans_to_one_side_alone_is_no_instrument():
-    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(3)
-    t = 20.0 * np.arange(60)
-    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
-    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
-    still = wt.Twin(robot).poses(commanded, t).position
-    leaning = wt.effects.PedestalTilt(compliance=(8e-6, 0.0))
-    leans = wt.Twin(robot, [leaning]).poses(commanded, t).position - still
-    # About x the base gives only where the arm pulls it to its left.
-    there = still + leans * (still[:, 1:2] > 0.0)
-    seen = commanded.with_measured(
-        wt.Measurements(t, there + [2.1, -1.3, 0.4] + rng.normal(scale=2e-5, size=there.shape))
-    )
-    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
-    places = {cause.place[0][0] for cause in found.causes if cause.share > 0.1}
-    assert places == {'base'}
-    assert {cause.dependence[0][0] for cause in found.causes if cause.share > 0.1} == {'load'}
+    def leaning(robot, commanded):
+        # About x the base gives only where the arm pulls it to its left.
+        still = wt.Twin(robot).poses(commanded).position
+        gives = wt.effects.PedestalTilt(compliance=(8e-6, 0.0))
+        leans = wt.Twin(robot, [gives]).poses(commanded).position - still
+        return still + leans * (still[:, 1:2] > 0.0)
+
+    found = at_stations('kuka_iiwa14', 3, leaning, noise=2e-5)
+    large = [cause for cause in found.causes if cause.share > 0.1]
+    assert {cause.place[0][0] for cause in large} == {'base'}
+    assert {cause.dependence[0][0] for cause in large} == {'load'}
 
 
 def test_a_loose_tool_that_falls_to_its_lower_side_is_no_noise():
-    robot, rng = wt.load('ur5'), np.random.default_rng(4)
-    t = 20.0 * np.arange(60)
-    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
-    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
-    poses = wt.Twin(robot).poses(commanded, t)
-    side = poses.rotation[:, :, 0]
-    there = poses.position - 2.5e-4 * side * np.sign(side[:, 2:])
-    seen = commanded.with_measured(
-        wt.Measurements(t, there + [2.1, -1.3, 0.4] + rng.normal(scale=3e-5, size=there.shape))
-    )
-    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+    def fallen(robot, commanded):
+        poses = wt.Twin(robot).poses(commanded)
+        side = poses.rotation[:, :, 0]
+        return poses.position - 2.5e-4 * side * np.sign(side[:, 2:])
+
+    found = at_stations('ur5', 4, fallen)
     assert found.status == 'unknown' and 'load at tool' in found.unexplained.structure
     places = {(cause.place[0][0], cause.dependence[0][0]) for cause in found.causes}
     assert places == {('tool', 'load')}
@@ -292,17 +291,15 @@ def test_a_loose_tool_that_falls_to_its_lower_side_is_no_noise():
 
 def test_what_is_far_wider_than_noise_is_told_as_above_it():
     """A dent at one angle of a joint, seen at stations where nothing shows the noise by itself."""
-    robot, rng = wt.load('kuka_iiwa14'), np.random.default_rng(6)
-    t = 20.0 * np.arange(60)
-    q = rng.uniform(-1.5, 1.5, (t.size, robot.n))
-    dent = np.zeros_like(q)
-    dent[:, 1] = 1.2e-3 * np.exp(-0.5 * ((q[:, 1] - 0.4) / 0.15) ** 2)
-    commanded = wt.Recording('stations', wt.JointMotion(t, q, static=True))
-    there = wt.Recording('real', wt.JointMotion(t, q + dent, static=True))
-    position = wt.Twin(robot).poses(there, t).position
-    position += rng.normal(scale=3e-5, size=position.shape)
-    seen = commanded.with_measured(wt.Measurements(t, position + [2.1, -1.3, 0.4]))
-    found = wt.diagnose(seen, robot, align='base,tool', experiment=False)
+
+    def dented(robot, commanded):
+        q = np.array(commanded.joints.q)
+        q[:, 1] += 1.2e-3 * np.exp(-0.5 * ((q[:, 1] - 0.4) / 0.15) ** 2)
+        there = wt.JointMotion(commanded.joints.t, q, static=True)
+        return wt.Twin(robot).poses(wt.Recording('real', there)).position
+
+    found = at_stations('kuka_iiwa14', 6, dented)
     assert found.status == 'unknown' and found.unexplained.above_noise
     (cause,) = found.causes
-    assert (cause.place[0][0], cause.dependence[0][0]) == (robot.joint_names[1], 'angle')
+    joint = found.model.robot.joint_names[1]
+    assert (cause.place[0][0], cause.dependence[0][0]) == (joint, 'angle')

@@ -92,6 +92,23 @@ def test_what_a_suspicion_says_of_joints_is_what_it_undoes(ur5, still, words, sp
     assert any(np.allclose(q, still.joints.q, atol=1e-12) for q in undone)
 
 
+@pytest.mark.parametrize(
+    ('words', 'factor'),
+    [
+        ('measured positions are in millimetres', 1e3),
+        ('measured positions are in inches', 1.0 / 0.0254),
+        ('y of the measured positions is in millimetres where', [1.0, 1e3, 1.0]),
+        ('y of the measured positions is in millimetres, the others', [1e-3, 1.0, 1e-3]),
+    ],
+)
+def test_what_a_suspicion_says_of_positions_is_what_it_undoes(ur5, still, words, factor):
+    (fitting,) = (each for each in suspicions(ur5) if words in each.sentence)
+    position = still.measured.position
+    bad = still.with_measured(replace(still.measured, position=position * factor))
+    (undone,) = fitting.mend(Given((bad,), ur5, FRAMES)).recordings
+    np.testing.assert_allclose(undone.measured.position, position, atol=1e-12)
+
+
 def test_joint_3_counted_against_the_ground_is_put_right_either_way(ur5, still):
     for sign, word in ((1.0, 'Add'), (-1.0, 'Subtract')):
         bad = np.array(still.joints.q)
@@ -473,16 +490,6 @@ def test_noise_of_efforts_makes_nothing_a_cause_that_explains_none_of_the_differ
     shaken = effort.value + rng.normal(scale=6.0, size=effort.value.shape)
     (known,) = with_sign([replace(run, effort=replace(effort, value=shaken))], robot)
     assert [cause.name for cause in compared([known], robot).causes] == ['payload']
-
-
-def test_efforts_in_another_unit_are_refused_with_what_it_may_be(rng):
-    robot = load('ur10e')
-    run = recorded(robot, stations(robot, rng, 40), rng, points=True)
-    effort = with_expected_effort(run, robot, -1.0).effort
-    for factor, words in ((1e3, 'N mm in the place of N m'), (30.0, 'per cent')):
-        wrong = replace(effort, value=factor * effort.value)
-        with pytest.raises(DataError, match=words):
-            with_sign([replace(run, effort=wrong)], robot)
 
 
 # What is believed -------------------------------------------------------------------------------

@@ -213,19 +213,12 @@ def hung(cell, axis, angle, gravity):
     return robot, [cell.rests(robot=robot)]
 
 
-DEGREES = np.degrees(1.0)
-FOURTH = np.where(np.arange(6) == 3, DEGREES, 1.0)
 HALF, QUARTER = np.array([-1, -1, 1]), np.array([0.5 * np.pi, 0, 0, 0, 0, 0])
-BACK = Rotation.from_euler('y', -90.0, degrees=True).as_matrix()
 KINDS = {
     # Units, signs, joints and frames
     'sound': ('', lambda c: c.placed),
     'sound, moving': ('', lambda c: c.own, NONE),
     'degrees': ('units', lambda c: joints(c.placed, np.degrees)),
-    'one joint in degrees': ('units', lambda c: joints(c.placed, lambda q: q * FOURTH)),
-    'one joint in radians': ('units', lambda c: joints(c.placed, lambda q: np.radians(q * FOURTH))),
-    'inches': ('units', lambda c: points(c.placed, lambda p: p / 0.0254)),
-    'one axis in millimetres': ('units', lambda c: points(c.placed, lambda p: p * [1e3, 1, 1])),
     'two joints the other way': ('sign', lambda c: joints(c.placed, lambda q: q * [1, -1, 1, 1, -1, 1])),
     'a left-handed frame': ('sign', lambda c: points(c.placed, lambda p: p * [1, 1, -1])),
     'units and sign': ('sign units', lambda c: points(
@@ -241,7 +234,6 @@ KINDS = {
     'such a base is fitted': ('', lambda c: points(c.own, lambda p: p * HALF), ('base',)),
     'joint 1 off by a quarter': ('base_turned', lambda c: joints(
         c.own, lambda q: q - QUARTER), NONE),
-    'a base axis onto axis': ('base_turned', lambda c: points(c.own, lambda p: p @ BACK.T), NONE),
     'rows mixed up': ('other', lambda c: joints(c.placed, lambda q: q[c.rng.permutation(len(q))])),
     'a reading missed': ('other', lambda c: one_off(c, np.delete(np.arange(60), 25))),
     'a reading doubled': ('other', lambda c: one_off(c, np.insert(np.arange(60), 40, 40)[:-1])),
@@ -252,7 +244,6 @@ KINDS = {
         c.placed, lambda r: matrix_from_quaternion(np.roll(quaternion_from_matrix(r), 1, axis=-1)))),
     'few stations of a coupled wrist': ('', coupled_wrist, NONE),
     # Clocks and streams
-    'late': ('clock', lambda c: stamps(c.run, lambda t: t + 0.3)),
     'early': ('clock', lambda c: stamps(c.run, lambda t: t - 0.25)),
     'another epoch': ('clock', lambda c: stamps(
         c.moves(seconds=12.0), lambda t: t + 5000.0), NONE),

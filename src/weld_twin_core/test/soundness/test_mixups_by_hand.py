@@ -11,14 +11,13 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Change
-from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness import mixups as mix_ups
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
 from weld_twin_core.diagnosis.soundness.evidence import Case, mistake
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _too_large_along
 from weld_twin_core.diagnosis.soundness.mending import Given
-from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
+from weld_twin_core.diagnosis.soundness.mixups import _best
 from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
 from weld_twin_core.diagnosis.soundness.slips import (
     Slip,
@@ -44,27 +43,12 @@ def still(ur5, rng):
     return recorded(ur5, stations(ur5, rng, 40), rng, points=True)
 
 
-def judged(robot, *recordings, align=()):
-    return mixups(Case(*aligned(recordings, robot, frozenset(align), ())))
-
-
 def some(robot, *words):
     """Return the suspicions that say one of these."""
     return [s for s in suspicions(robot) if any(word in s.sentence for word in words)]
 
 
 # The judge --------------------------------------------------------------------------------------
-
-
-def test_the_sign_of_a_joint_is_told_with_the_gap_before_and_after(ur5, still):
-    bad = rejointed(still, still.joints.q * ELBOW_TURNED)
-    (found,) = judged(ur5, bad)
-    assert (found.kind, found.at, found.alike) == ('sign', ('elbow_joint',), ())
-    before = np.median(
-        np.linalg.norm(asked(ur5, bad, align=())[0].residuals(asked(ur5, bad)[1])[0], axis=0)
-    )
-    assert f'the gap falls from {before * 1e3:.3g} mm to 0.0' in found.sentence
-    assert not judged(ur5, still)
 
 
 def test_of_mix_ups_that_do_as_well_the_first_of_the_table_is_named_and_the_others_are_alike(

@@ -64,20 +64,3 @@ def test_ripple_is_found_in_a_path_beside_stations_that_came_first(arm):
         ('transmission_ripple', 'shoulder_lift_joint')
     ]
     assert found.effects[0].effect.order == 50.0
-
-
-def test_a_staircase_is_found_in_recordings_of_different_travel(arm):
-    made = []
-    for name, share in (('little', 0.3), ('wide', 1.0)):
-        motion = recorded(arm, name, False).joints
-        q = motion.q.copy()
-        q[:, 2] = q[0, 2] + share * (q[:, 2] - q[0, 2])
-        motion = wt.JointMotion(motion.t, q)
-        stairs = wt.effects.Quantization('elbow_joint', step=2e-3)
-        real = wt.Twin(arm, [stairs]).poses(wt.Recording(name, motion))
-        noise = np.random.default_rng(2).normal(0.0, 2e-5, real.position.shape)
-        made.append(wt.Recording(name, motion, wt.Measurements(motion.t, real.position + noise)))
-    found = wt.diagnose(made, arm, experiment=False)
-    assert [(e.effect.name, e.effect.site) for e in found.effects] == [
-        ('quantization', 'elbow_joint')
-    ]

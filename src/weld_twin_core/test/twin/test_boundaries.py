@@ -14,7 +14,6 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording, Signa
 from weld_twin_core.twin.twin import Twin
 
 MOTION = JointMotion([0.0, 1.0], np.zeros((2, 6)))
-JOINTS = [{'name': 'j0'}, {'name': 'j1'}]
 
 DATA = [
     (lambda: readonly('x', (None,), 'q'), "q must be numbers, got 'x'"),
@@ -63,108 +62,63 @@ DATA = [
     ),
 ]
 
-ROBOTS = [
-    ([], 'a robot file must be a mapping of keys, got list'),
-    ({'name': 'r'}, "robot 'r' needs a list 'joints' in chain order"),
-    ({'name': 'r', 'joints': [{'a': 1}]}, "joint 0 of robot 'r' needs a 'name'"),
-    (
-        {'name': 'r', 'joints': JOINTS * 2},
-        "robot 'r' uses a joint name twice: ('j0', 'j1', 'j0', 'j1')",
-    ),
-    (
-        {'name': 'r', 'joints': [{'name': 'j0', 'type': 'ball'}]},
-        "joint 'j0': type must be revolute or prismatic, got 'ball'",
-    ),
-    (
-        {'name': 'r', 'joints': [{'name': 'j0', 'a': 'long'}]},
-        "robot 'r': a of robot 'r' must be numbers, got ['long']",
-    ),
-    (
-        {'name': 'r', 'joints': JOINTS, 'links': [{'mass': 1.0}]},
-        "robot 'r' has 1 links for 2 joints; give one per joint",
-    ),
-    (
-        {'name': 'r', 'joints': JOINTS, 'convention': 'craig'},
-        "convention of robot 'r' must be one of standard, modified, got 'craig'",
-    ),
-    (
-        {'name': 'r', 'joints': JOINTS, 'tool': {'quat_xyzw': [0, 0, 0, 0]}},
-        "robot 'r': tool quat_xyzw 0 has length 0, a rotation needs 1; check the order (x y z w) and "
-        'that it is not left at zero',
-    ),
-    (
-        {'name': 'r', 'joints': [{'name': 'j0', 'lower': 1.0, 'upper': -1.0}]},
-        "joint 'j0': lower limit is not below upper",
-    ),
-]
+ROBOTS = yaml.safe_load("""
+- [[], "a robot file must be a mapping of keys, got list"]
+- [{name: r}, "robot 'r' needs a list 'joints' in chain order"]
+- [{name: r, joints: [{a: 1}]}, "joint 0 of robot 'r' needs a 'name'"]
+- - {name: r, joints: [{name: j0}, {name: j1}, {name: j0}, {name: j1}]}
+  - "robot 'r' uses a joint name twice: ('j0', 'j1', 'j0', 'j1')"
+- - {name: r, joints: [{name: j0, type: ball}]}
+  - "joint 'j0': type must be revolute or prismatic, got 'ball'"
+- - {name: r, joints: [{name: j0, a: long}]}
+  - "robot 'r': a of robot 'r' must be numbers, got ['long']"
+- - {name: r, joints: [{name: j0}, {name: j1}], links: [{mass: 1.0}]}
+  - robot 'r' has 1 links for 2 joints; give one per joint
+- - {name: r, joints: [{name: j0}, {name: j1}], convention: craig}
+  - convention of robot 'r' must be one of standard, modified, got 'craig'
+- - {name: r, joints: [{name: j0}, {name: j1}], tool: {quat_xyzw: [0, 0, 0, 0]}}
+  - "robot 'r': tool quat_xyzw 0 has length 0, a rotation needs 1; check the order (x y z w) and
+    that it is not left at zero"
+- - {name: r, joints: [{name: j0, lower: 1.0, upper: -1.0}]}
+  - "joint 'j0': lower limit is not below upper"
+""")
 
-EFFECTS = [
-    ('backlash', "an effect must be a mapping with the key 'effect', got 'backlash'"),
-    (
-        {'effect': 'joint_offset', 'joint': 'j9'},
-        "robot 'ur5' has no joint 'j9'; its joints are j0, j1, j2, j3, j4, j5",
-    ),
-    ({'effect': 'joint_offset', 'joint': None}, 'joint_offset needs a joint'),
-    (
-        {'effect': 'joint_offset'},
-        "effect 'joint_offset': JointOffset.__init__() missing 1 required positional argument: "
-        "'joint'",
-    ),
-    (
-        {'effect': 'joint_offset', 'joint': 'j0', 'angle': 1.0},
-        "effect 'joint_offset' has no parameter 'angle'; it takes joint, offset",
-    ),
-    (
-        {'effect': 'joint_offset', 'joint': 'j0', 'offset': 'big'},
-        "effect 'joint_offset': offset must be a number, got 'big'",
-    ),
-    (
-        {'effect': 'joint_offset', 'joint': 'j0', 'offset': True},
-        "effect 'joint_offset': offset must be a number, got True",
-    ),
-    (
-        {'effect': 'joint_offset', 'joint': 'j0', 'offset': [1.0, 2.0]},
-        "effect 'joint_offset': offset must be one number, got [1.0, 2.0]",
-    ),
-    (
-        {'effect': 'joint_offset', 'joint': 'j0', 'offset': float('nan')},
-        'joint_offset: offset is not finite',
-    ),
-    (
-        {'effect': 'base_pose', 'xyz': [0.0, 1.0]},
-        "effect 'base_pose': xyz must be 3 numbers, got [0.0, 1.0]",
-    ),
-    (
-        {'effect': 'backlash', 'joint': 'j0', 'width': -1e-3},
-        'backlash: width = -0.001 rad is outside [0, inf]',
-    ),
-    (
-        {'effect': 'backlash', 'joint': 'j0', 'form': 'gap'},
-        "backlash: form must be one of ('play', 'reversal', 'coast'), got 'gap'",
-    ),
-    ({'effect': 'joint_coupling', 'joint': 'j0'}, 'joint_coupling needs a source joint'),
-    (
-        {'effect': 'joint_coupling', 'joint': 'j0', 'source': 'j0'},
-        'joint_coupling: source and joint are the same; use gear_ratio',
-    ),
-    (
-        {'effect': 'thermal_growth', 'links': 'j0'},
-        "thermal_growth: links must be a list, got 'j0'",
-    ),
-    (
-        {'effect': 'thermal_growth', 'reference': 'warm'},
-        "thermal_growth: reference must be a number, got 'warm'",
-    ),
-    (
-        {'effect': 'thermal_growth', 'warmup': [10.0, 0.0]},
-        'thermal_growth: warmup must be [rise in K, time constant in s above zero], got [10.0, 0.0]',
-    ),
-    (
-        {'effect': 'transmission_ripple', 'joint': 'j0', 'amplitude': [1, 2], 'order': [1, 2, 3]},
-        'transmission_ripple: amplitude, order and phase must be numbers or lists of one length, '
-        'got lengths [2, 3]',
-    ),
-]
+EFFECTS = yaml.safe_load("""
+- [backlash, "an effect must be a mapping with the key 'effect', got 'backlash'"]
+- - {effect: joint_offset, joint: j9}
+  - robot 'ur5' has no joint 'j9'; its joints are j0, j1, j2, j3, j4, j5
+- [{effect: joint_offset, joint: null}, "joint_offset needs a joint"]
+- - {effect: joint_offset}
+  - "effect 'joint_offset': JointOffset.__init__() missing 1 required positional argument:
+    'joint'"
+- - {effect: joint_offset, joint: j0, angle: 1.0}
+  - effect 'joint_offset' has no parameter 'angle'; it takes joint, offset
+- - {effect: joint_offset, joint: j0, offset: big}
+  - "effect 'joint_offset': offset must be a number, got 'big'"
+- - {effect: joint_offset, joint: j0, offset: true}
+  - "effect 'joint_offset': offset must be a number, got True"
+- - {effect: joint_offset, joint: j0, offset: [1.0, 2.0]}
+  - "effect 'joint_offset': offset must be one number, got [1.0, 2.0]"
+- - {effect: joint_offset, joint: j0, offset: .nan}
+  - "joint_offset: offset is not finite"
+- - {effect: base_pose, xyz: [0.0, 1.0]}
+  - "effect 'base_pose': xyz must be 3 numbers, got [0.0, 1.0]"
+- - {effect: backlash, joint: j0, width: -0.001}
+  - "backlash: width = -0.001 rad is outside [0, inf]"
+- - {effect: backlash, joint: j0, form: gap}
+  - "backlash: form must be one of ('play', 'reversal', 'coast'), got 'gap'"
+- [{effect: joint_coupling, joint: j0}, "joint_coupling needs a source joint"]
+- - {effect: joint_coupling, joint: j0, source: j0}
+  - "joint_coupling: source and joint are the same; use gear_ratio"
+- [{effect: thermal_growth, links: j0}, "thermal_growth: links must be a list, got 'j0'"]
+- - {effect: thermal_growth, reference: warm}
+  - "thermal_growth: reference must be a number, got 'warm'"
+- - {effect: thermal_growth, warmup: [10.0, 0.0]}
+  - "thermal_growth: warmup must be [rise in K, time constant in s above zero], got [10.0, 0.0]"
+- - {effect: transmission_ripple, joint: j0, amplitude: [1, 2], order: [1, 2, 3]}
+  - "transmission_ripple: amplitude, order and phase must be numbers or lists of one length, got
+    lengths [2, 3]"
+""")
 
 
 @pytest.mark.parametrize(('call', 'sentence'), DATA)

@@ -142,15 +142,16 @@ def smaller(chosen, share):
     return chosen.with_vector(chosen.vector() * np.where(linear, share, 1.0))
 
 
+@pytest.mark.parametrize('robot', ['standard', 'modified positioner'], indirect=True)
 def test_all_effects_together_are_off_by_products_of_small_displacements_only(
-    build, make_recording, stamps
+    robot, make_recording, stamps
 ):
     """What is left out of a derivative is as large as the other effects are, and shrinks with them."""
-    recording = make_recording(build)
+    recording = make_recording(robot)
     effects = [effect(name) for name in ENTRIES if name not in FLANKS]
     (half, name), (eighth, _) = (
         worst(
-            build, [smaller(e, share) for e in effects], recording, stamps(recording), 5e-3, 2e-7
+            robot, [smaller(e, share) for e in effects], recording, stamps(recording), 5e-3, 2e-7
         )
         for share in (0.5, 0.125)
     )

@@ -3,7 +3,6 @@
 """An arm that is corrected keeps what the plan of its measurement promised."""
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
@@ -37,10 +36,9 @@ def _with_middle_frames(robot, step):
     return robot.with_frames(base=base, tool=tool)
 
 
-@pytest.mark.parametrize(('arm', 'seed'), [('ur5', 11), ('kuka_kr6_r900', 12)])
-def test_a_corrected_arm_keeps_what_its_plan_promised(arm, seed):
+def test_a_corrected_arm_keeps_what_its_plan_promised():
     """Measured at the stations of the plan, corrected, and driven where it never was."""
-    robot, rng = catalog.load(arm), np.random.default_rng(seed)
+    robot, rng = catalog.load('kuka_kr6_r900'), np.random.default_rng(12)
     flaws = small_errors(robot, rng)
 
     def driven(q, noise):

@@ -102,7 +102,7 @@ def test_one_miss_in_ten_or_one_complaint_fails_the_proof():
 @pytest.mark.slow
 def test_the_command_names_mistakes_and_spares_the_sound(tmp_path, capsys):
     words = ('lab', 'gate', '--out', str(tmp_path), '--draws', '1', '--sound', '1')
-    assert main([*words, '--kinds', 'units', '--workers', '1', '--seed', '5']) in (0, 1)
+    assert main([*words, '--kinds', 'units', '--workers', '1', '--seed', '3']) in (0, 1)
     content = json.loads((tmp_path / 'gate.json').read_text())
     assert content['named']['units'] == {
         'trials': 2,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import done
 from diagnosis_cells import all_but
 from own_arm import Arm, frame, measured, model, motion, stations
 from scipy.spatial.transform import Rotation
@@ -35,21 +36,13 @@ def kinds(*recordings, align=('base', 'tool')):
     return [(item.kind, item.at) for item in looked(*recordings, align=align).unsound]
 
 
-@pytest.fixture
-def cell(tmp_path):
-    """Return a function that diagnoses recordings by command; gives exit code and content."""
+OTHERS = all_but('joint_offset', 'link_offset', 'tool_pose')
 
-    def run(*recordings, options=()):
-        write_robot_yaml(tmp_path / 'own.yaml', model())
-        for one in recordings:
-            write_recording(tmp_path / one.name, one, model())
-        bags = [str(tmp_path / one.name) for one in recordings]
-        out, robot = tmp_path / 'out', str(tmp_path / 'own.yaml')
-        others = ('--exclude-effect', *all_but('joint_offset', 'link_offset', 'tool_pose'))
-        code = main(['diagnose', *bags, '--robot', robot, *options, *others, '--out', str(out)])
-        return code, json.loads((out / 'diagnosis.json').read_text())
 
-    return run
+def diagnosed(*recordings, **options):
+    """Return what is said of recordings, frames fitted."""
+    words = {'align': 'base,tool', 'exclude': OTHERS, 'experiment': False, **options}
+    return wt.diagnose(list(recordings), model(), **words).as_dict()
 
 
 # Tools -----------------------------------------------------------------------------------------
@@ -69,11 +62,8 @@ def pair(rng, second, **how):
     return first, measured(other, 5.0 * np.arange(40), stations(rng), rng, name='after', **how)
 
 
-def test_a_tool_that_may_change_and_did_by_millimetres_is_fitted(cell, rng):
-    code, found = cell(
-        *pair(rng, turned(24.0)), options=('--align', 'base,tool', '--may-change', 'tool_pose')
-    )
-    assert code == 0
+def test_a_tool_that_may_change_and_did_by_millimetres_is_fitted(rng):
+    found = diagnosed(*pair(rng, turned(24.0)), may_change='tool_pose')
     (zero,) = found['verdict']['effects']
     assert (zero['effect'], zero['joint']) == ('joint_offset', 'u')
     assert zero['parameters']['offset'] == pytest.approx(4e-3, abs=1e-4)
@@ -231,20 +221,25 @@ def on_the_arm(rng, noise=5e-5):
     return wt.Recording('board', wt.JointMotion(t, q), seen)
 
 
-def test_a_board_seen_from_the_arm_is_told_and_inverted(rng, cell):
+def test_a_board_seen_from_the_arm_is_told_and_inverted(rng, tmp_path):
     board = on_the_arm(rng)
     seen = looked(board, apply=True)
     (item,) = seen.unsound
     assert (item.kind, item.at) == ('camera_inverted', ('instrument',)) and seen.posed is not None
-    code, found = cell(board, options=('--align', 'base,tool', '--measured-inverse'))
-    assert code == 0 and not found['unsound']
+    write_robot_yaml(tmp_path / 'own.yaml', model())
+    write_recording(tmp_path / 'board', board, model())
+    robot = ('--robot', tmp_path / 'own.yaml', '--exclude-effect', *OTHERS)
+    words = ('diagnose', tmp_path / 'board', *robot, '--align', 'base,tool', '--measured-inverse')
+    done(*words, '--out', tmp_path / 'out')
+    found = json.loads((tmp_path / 'out' / 'diagnosis.json').read_text())
+    assert not found['unsound']
     assert 'u' in {effect['joint'] for effect in found['verdict']['effects']}
 
 
 # What changed, and what did not ----------------------------------------------------------------
 
 
-def test_a_slip_between_recordings_is_seen_beside_a_gross_reading(rng, cell):
+def test_a_slip_between_recordings_is_seen_beside_a_gross_reading(rng):
     slipped = REAL.off(theta=[0, 0, 0, 0, 5e-4, 0], d=[0, 0, 0, 9e-4, 0, 0])
     common = REAL.off(d=[0, 0, 0, 9e-4, 0, 0])
     first, second = (
@@ -254,9 +249,7 @@ def test_a_slip_between_recordings_is_seen_beside_a_gross_reading(rng, cell):
     position = first.measured.position.copy()
     position[12] += [0.006, 0.007, -0.002]
     first = first.with_measured(replace(first.measured, position=position))
-    options = ('--align', 'base,tool', '--may-change', 'joint_offset,tool_pose')
-    _, found = cell(first, second, options=options)
-    (changed,) = found['changed']
+    (changed,) = diagnosed(first, second, may_change='joint_offset,tool_pose')['changed']
     assert (changed['recording'], changed['effect'], changed['joint']) == (1, 'joint_offset', 'b')
     assert changed['value'] == pytest.approx(5e-4, abs=1e-4)
 

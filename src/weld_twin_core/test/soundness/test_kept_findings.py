@@ -213,7 +213,7 @@ def hung(cell, axis, angle, gravity):
     return robot, [cell.rests(robot=robot)]
 
 
-HALF, QUARTER = np.array([-1, -1, 1]), np.array([0.5 * np.pi, 0, 0, 0, 0, 0])
+HALF = np.array([-1, -1, 1])
 KINDS = {
     # Units, signs, joints and frames
     'sound': ('', lambda c: c.placed),
@@ -223,8 +223,6 @@ KINDS = {
     'a left-handed frame': ('sign', lambda c: points(c.placed, lambda p: p * [1, 1, -1])),
     'units and sign': ('sign units', lambda c: points(
         joints(c.placed, lambda q: q * [1, 1, -1, 1, 1, 1]), lambda p: p * 1e3)),
-    'joint 3 against the ground': ('coupled_axes', lambda c: joints(
-        c.placed, lambda q: q + np.outer(q[:, 1], [0, 0, 1, 0, 0, 0]))),
     'another arm': ('other_robot', lambda c: (load('abb_irb120'), [c.placed])),
     'a sibling that is not bundled': ('other_robot', lambda c: (sibling(c, 1.04, 1.1), [c.placed])),
     'links of a sibling': ('other_robot', lambda c: (sibling(c, 1.014), [c.rests(points=True)]), NONE),
@@ -232,8 +230,6 @@ KINDS = {
     'a frame that nobody asked to fit': ('other', lambda c: c.rests(robot=c.elsewhere(0.0)), NONE),
     'a base turned by half a turn': ('base_turned', lambda c: points(c.own, lambda p: p * HALF), NONE),
     'such a base is fitted': ('', lambda c: points(c.own, lambda p: p * HALF), ('base',)),
-    'joint 1 off by a quarter': ('base_turned', lambda c: joints(
-        c.own, lambda q: q - QUARTER), NONE),
     'rows mixed up': ('other', lambda c: joints(c.placed, lambda q: q[c.rng.permutation(len(q))])),
     'a reading missed': ('other', lambda c: one_off(c, np.delete(np.arange(60), 25))),
     'a reading doubled': ('other', lambda c: one_off(c, np.insert(np.arange(60), 40, 40)[:-1])),

@@ -10,6 +10,7 @@ from command_line import refused
 from weld_twin_lab.blind import seal
 from weld_twin_lab.study import DONE
 from weld_twin_msgs_py.bags import BagReader
+from weld_twin_nodes.offline import task_pool
 
 pytest.importorskip('mujoco')
 
@@ -21,8 +22,10 @@ def checked(tmp_path_factory):
 
     out = tmp_path_factory.mktemp('blind') / 'check'
     words = ['--cases', '1', '--seed', '3', '--kinds', 'single', '--seconds', '6,8']
-    words += ['--workers', '1', '--out', str(out)]
-    assert main(['blind', 'run', *words]) == 0
+    words += ['--out', str(out)]
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(task_pool, 'pool_of', lambda *_: task_pool.Here())
+        assert main(['blind', 'run', *words]) == 0
     return out, words
 
 

@@ -95,3 +95,10 @@ def test_a_tool_that_slipped_stays_slipped(epoch, first, same, slipped, told):
     moved = np.linalg.norm(positions(carried, other) - positions((), other), axis=1)
     np.testing.assert_array_equal(moved > 5e-4, slipped)
     assert [told in sentence for sentence in said] == ([True] if told else [])
+
+
+@pytest.mark.parametrize(('lasted', 'told'), [(19, False), (10, True)])
+def test_growing_longer_than_anybody_saw_is_told(lasted, told):
+    drift = effect_from_mapping({'effect': 'drift', 'xyz_rate': [1e-6, 0.0, 0.0]})
+    _, said = in_use([drift], 0, (0, lasted * SECOND), stations(0, 20), same=False)
+    assert [f'lasted {lasted} s' in s and 'lasts 19 s' in s for s in said] == [True] * told

@@ -327,17 +327,29 @@ def in_use(
     known, later = same or _dated(epoch_ns, other), (other.epoch_ns - epoch_ns) * 1e-9
     if known and _overlap(span_ns, other):
         return _recounted(effects, later), []
+    said = _longer(effects, (span_ns[1] - span_ns[0]) * 1e-9, other)
     why, after = '', not known or other.span_ns[0] > span_ns[1]
     if known:
         out = _recounted([e for e in effects if not isinstance(e, _SetupMotion)], later)
     else:
         out = of_the_robot(effects)
         why = ', for stamps without a date do not tell when; give both the date and time'
-    return out, [
+    return out, said + [
         f'{effect.traits.title} at t = {effect.time:.4g} s of the recording diagnosed: '
         f'{other.name} is taken as recorded {"after" if after else "before"} that{why}.'
         for effect in effects
         if isinstance(effect, Sudden)
+    ]
+
+
+def _longer(effects: Sequence[Effect], lasted: float, other: Recording) -> list[str]:
+    """Return which effects another recording has grow longer than anybody saw them do."""
+    duration = float(np.ptp(other.joints.t))
+    return [
+        f'{effect.traits.title}: the recording diagnosed lasted {lasted:.6g} s, {other.name} lasts '
+        f'{duration:.6g} s; nobody knows whether it goes on growing as it did.'
+        for effect in effects
+        if effect.traits.endless and duration > lasted
     ]
 
 

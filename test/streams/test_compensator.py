@@ -222,12 +222,20 @@ def test_inactive_it_refuses_goals_and_an_order_to_stop_passes(inactive):
 
 
 def test_the_real_arm_goes_where_a_goal_meant_and_all_else_passes_through(planner):
-    motion, feedback = sway(), []
+    """Joints come in another order, with a track beside them that is left."""
+    motion, feedback, order = sway(), [], [3, 0, 5, 1, 4, 2]
+    names = ['track', *(NAMES[k] for k in order)]
+    q = np.column_stack([motion.t, motion.q[:, order]])
+    rates = np.column_stack([np.ones(motion.t.size), motion.velocity[:, order]])
     planner.added.clear()
-    handle, line = planner.send(planner.goal(motion), feedback.append)
-    assert handle.accepted
+    asked = planner.goal(JointMotion(motion.t, q, rates), names=names)
+    handle, line = planner.send(asked, feedback.append)
+    assert handle.accepted, line
     assert (line['verdict'], line['applied']) == ('corrected', True)
-    got = points(planner.controller.goals[-1])
+    sent = planner.controller.goals[-1]
+    assert list(sent.trajectory.joint_names) == names
+    np.testing.assert_array_equal(points(sent)[:, 0], motion.t)
+    got = points(sent)[:, [1 + order.index(k) for k in range(6)]]
     np.testing.assert_allclose(forward(real_arm(), got), forward(ROBOT, motion.q), atol=1e-9)
     assert line['largest_m'] == pytest.approx(line['expected_before_m'], rel=0.5)
     assert line['bound_m'] > line['expected_after_m']
@@ -236,25 +244,6 @@ def test_the_real_arm_goes_where_a_goal_meant_and_all_else_passes_through(planne
     assert len(feedback) > 10
     assert json.loads((planner.model.parent / 'audit.jsonl').read_text().splitlines()[-1]) == line
     planner.cell.wait(lambda: len(planner.added) == motion.t.size, 'a correction of every point')
-
-
-def test_joints_come_in_any_order_and_a_track_beside_them_is_left(planner):
-    motion, order = sway(), [3, 0, 5, 1, 4, 2]
-    names = ['track', *(NAMES[k] for k in order)]
-    wide = JointMotion(
-        motion.t,
-        np.column_stack([motion.t, motion.q[:, order]]),
-        np.column_stack([np.ones(motion.t.size), motion.velocity[:, order]]),
-    )
-    asked = planner.goal(wide, names=names)
-    handle, line = planner.send(asked)
-    assert handle.accepted, line
-    sent = planner.controller.goals[-1]
-    assert list(sent.trajectory.joint_names) == names
-    np.testing.assert_array_equal(points(sent)[:, 0], motion.t)
-    arm = points(sent)[:, [1 + order.index(k) for k in range(6)]]
-    np.testing.assert_allclose(forward(real_arm(), arm), forward(ROBOT, motion.q), atol=1e-9)
-    planner.result(handle)
 
 
 def test_a_single_point_and_one_at_time_zero_are_corrected(planner):

@@ -38,28 +38,22 @@ def test_every_module_of_the_nodes_is_imported_without_the_pages():
     assert web == []
 
 
-def test_the_command_line_has_the_commands_that_write_no_page(tmp_path):
+def test_the_command_line_has_the_other_commands_and_says_which_package_brings_these(tmp_path):
     done = python(
         'from weld_twin_nodes.cli.in_process import weld_twin\n'
-        'bag, *words = sys.argv[1:]\n'
-        'for each in (["--help"], ["simulate", *words, "--out", bag], ["bag", bag]):\n'
+        'names, bag, *words = sys.argv[1:]\n'
+        'for each in (["--help"], ["simulate", *words, "--out", bag], ["bag", bag],\n'
+        '    *([name] for name in names.split())):\n'
         '    said = weld_twin(*each)\n'
         '    print(said.code, said.out, said.err, "<end>")\n',
-        *(tmp_path / 'bag', '--robot', 'ur5', '--rate', 20, '--path', 'line'),
+        *(' '.join(sorted(PAGES)), tmp_path / 'bag'),
+        *('--robot', 'ur5', '--rate', 20, '--path', 'line'),
     )
-    listed, made, shown = done.stdout.split('<end>\n')[:-1]
+    listed, made, shown, *missing = done.stdout.split('<end>\n')[:-1]
     assert [text[:2] for text in (listed, made, shown)] == ['0 '] * 3, done.stdout
     assert ' simulate ' in listed and ' bag ' in listed
     assert not {name for name in PAGES if f' {name} ' in listed}
     assert 'usable for a diagnosis' in shown
-
-
-def test_a_command_that_is_missing_says_which_package_brings_it():
-    done = python(
-        'from weld_twin_nodes.cli.in_process import weld_twin\n'
-        'for name in sys.argv[1:]: print(*weld_twin(name))\n',
-        *sorted(PAGES),
-    )
-    for name, line in zip(sorted(PAGES), done.stdout.split('\n\n')[:-1], strict=True):
-        assert line.startswith('2 '), done.stderr
-        assert f"'{name}' writes pages; it needs the package weld_twin_report" in line
+    for name, told in zip(sorted(PAGES), missing, strict=True):
+        assert told.startswith('2 '), done.stderr
+        assert f"'{name}' writes pages; it needs the package weld_twin_report" in told

@@ -37,22 +37,30 @@ def same_start(monkeypatch):
     return number
 
 
-def test_processes_with_other_folders_for_temporary_files_get_other_domains(same_start, tmp_path):
-    other = subprocess.Popen(
-        [sys.executable, '-c', HOLD, str(same_start)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, 'TMPDIR': str(tmp_path)},
-    )
-    theirs = int(other.stdout.readline())
-    try:
-        assert str(tmp_path) != tempfile.gettempdir()
+def test_another_process_has_another_domain_which_is_free_again_once_that_is_killed(
+    same_start, tmp_path
+):
+    """Its folder for temporary files is another, too, as it is for other users."""
+    assert str(tmp_path) != tempfile.gettempdir()
+    for _ in range(5):  # somebody else on this machine may take it first
+        other = subprocess.Popen(
+            [sys.executable, '-c', HOLD, str(same_start)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, 'TMPDIR': str(tmp_path)},
+        )
+        theirs = int(other.stdout.readline())
+        try:
+            with own_domain() as ours:
+                assert ours != theirs
+        finally:
+            other.kill()
+            other.communicate()
         with own_domain() as ours:
-            assert ours != theirs
-    finally:
-        other.kill()
-        other.communicate()
+            if ours == theirs:
+                return
+    pytest.fail('no domain of a holder that was killed was given again')
 
 
 @pytest.mark.parametrize('elsewhere', [0, 6])
@@ -79,18 +87,3 @@ def _stranger(domain):
     finally:
         node.destroy_node()
         context.try_shutdown()
-
-
-def test_a_domain_is_free_again_once_its_holder_is_killed(same_start):
-    command = [sys.executable, '-c', HOLD, str(same_start)]
-    for _ in range(5):  # somebody else on this machine may take it first
-        holder = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        theirs = int(holder.stdout.readline())
-        holder.kill()
-        holder.communicate()
-        with own_domain() as ours:
-            if ours == theirs:
-                return
-    pytest.fail('no domain of a holder that was killed was given again')

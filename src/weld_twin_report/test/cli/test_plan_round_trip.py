@@ -132,6 +132,20 @@ def test_a_urdf_that_leaves_limits_out_is_told_where_moves_are_planned_or_writte
     assert said[6:] in (tmp_path / 'stations.src.md').read_text()
 
 
+def test_a_table_that_was_filled_in_outlives_another_plan(tmp_path):
+    plan = (*WORDS, '--minutes', 9, '--out', tmp_path / 'plan')
+    done(*plan)
+    table, kept = tmp_path / 'plan/measurements.csv', tmp_path / 'plan/measurements.kept-1.csv'
+    filled = table.read_text().replace(',,,\n', ',1,2,3\n')
+    table.write_text(filled)
+    said = refused(*plan)
+    assert f"'{table}' was changed after weld-twin wrote it" in said
+    assert "--force, which keeps it as 'measurements.kept-1.csv'" in said
+    assert table.read_text() == filled
+    done(*plan, '--force')
+    assert kept.read_text() == filled and ',,,\n' in table.read_text()
+
+
 def test_a_tolerance_out_of_reach_is_told():
     result = done(*WORDS[:3], '--tolerance', 0.02, '--minutes', 6, '--noise', 0.1)
     assert re.search(r'all \d+ poses that fit into the time keep 0.02 mm at \d+%', result)

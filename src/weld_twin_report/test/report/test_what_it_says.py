@@ -28,21 +28,6 @@ def plain(text):
     return re.sub(r'\s+', ' ', re.sub('<[^>]+>', ' ', text))
 
 
-@pytest.mark.parametrize(
-    ('brand', 'told'),
-    [
-        ('fanuc', 'new value = what it reads now + 0.0687; then EXEC'),
-        ('abb', 'new value = old value - 0.001198 * G'),
-        ('yaskawa', 'in pulses: new value = old value - 0.0687 * P'),
-        ('ur', 'in radians: new value = old value + 0.001198;'),
-        ('kuka', '$MAMES of the axis, in degrees: new value = old value + 0.0687;'),
-    ],
-)
-def test_what_a_controller_asks_for_is_told_in_its_unit(brand, told):
-    zero = effect_from_mapping({'effect': 'joint_offset', 'joint': 'j5', 'offset': 1.1984e-3})
-    assert told in correction(zero, brand) and 'MASTER_COUN' not in correction(zero, brand)
-
-
 def test_one_is_no_plural():
     assert [counted(k, 'cell') for k in (0, 1, 2)] == ['0 cells', '1 cell', '2 cells']
     assert counted(1, 'diagnosis', 'diagnoses') == '1 diagnosis'

@@ -31,15 +31,7 @@ class NoServer(DataError):
 
 
 def programs() -> Path:
-    """
-    Return the folder of PostgreSQL's programs.
-
-    Raises
-    ------
-    NoServer
-        There is none.
-
-    """
+    """Return the folder of PostgreSQL's programs; raise NoServer where there is none."""
     versions = sorted(DEBIAN.glob('*/bin/initdb'), key=lambda file: float(file.parts[-3]))
     if versions:
         return versions[-1].parent
@@ -51,15 +43,7 @@ def programs() -> Path:
 
 @contextmanager
 def postgres() -> Iterator[str]:
-    """
-    Yield the URL of an empty database on a server that ends with the block.
-
-    Raises
-    ------
-    NoServer
-        PostgreSQL is not installed, or may not run here.
-
-    """
+    """Yield the URL of an empty database on a server of its own; raise NoServer where none runs."""
     found = programs()
     place = Path(tempfile.mkdtemp(prefix='pg-', dir='/tmp'))  # a socket's path is short
     try:

@@ -7,8 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-import urllib.error
-import urllib.request
 from contextlib import contextmanager
 from http.cookiejar import CookieJar
 from urllib.request import HTTPCookieProcessor, Request, build_opener
@@ -37,17 +35,6 @@ class Server:
         self.process.wait()
         self.process.stdout.close()
 
-    def get(self, path='/', *, data=None, **headers):
-        """Return status and text of an answer."""
-        request = urllib.request.Request(self.root + path, data=data)
-        for name, value in headers.items():
-            request.add_header(name.replace('_', '-'), value)
-        try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
-                return answer.status, answer.read().decode()
-        except urllib.error.HTTPError as error:
-            return error.code, error.read().decode()
-
 
 def form(robot='ur5', files=(('data.csv', b'a,b\n1,2\n'),), model=(), **fields):
     """Return the body of a form and its type."""
@@ -59,11 +46,6 @@ def form(robot='ur5', files=(('data.csv', b'a,b\n1,2\n'),), model=(), **fields):
         parts.append((head + 'Content-Type: application/octet-stream\r\n\r\n').encode() + content)
     body = b''.join(b'--edge\r\n' + part + b'\r\n' for part in parts) + b'--edge--\r\n'
     return body, 'multipart/form-data; boundary=edge'
-
-
-def drop(server, **how):
-    body, kind = form(**how)
-    return server.get('/recordings', data=body, Content_Type=kind)
 
 
 def until(page, selector, seconds=60):
@@ -83,13 +65,9 @@ class Person:
         request = Request(self.root + path, data, {'Content-Type': kind} if kind else {})
         try:
             with self.open(request, timeout=60) as answer:
-                return (
-                    answer.status,
-                    answer.url.removeprefix(self.root),
-                    answer.read().decode(
-                        'latin-1' if 'octet' in answer.headers['content-type'] else 'utf-8'
-                    ),
-                )
+                coding = 'latin-1' if 'octet' in answer.headers['content-type'] else 'utf-8'
+                text = answer.read().decode(coding)
+                return answer.status, answer.url.removeprefix(self.root), text
         except OSError as error:
             return error.code, path, error.read().decode()
 

@@ -137,20 +137,12 @@ MEASURED = (
 """What is measured, in messages of four types, and the deviation; UR5 stands in the world as its base
 does, so both axes are one."""
 MIXED = [3, 1, 5, 0, 2, 4]
-AS_TOLD = {
-    'feedback of a controller': (controller(BEYOND, Q), {'joint_part': 'feedback'}),
-    'a map of names behind a prefix': (
-        dynamic(Q, ['left/A1', *(f'left/{name}' for name in NAMES[1:])]),
-        {'joint_prefix': 'left/', 'joint_map': f'{{{NAMES[0]}: A1}}'},
-    ),
-}
 
 
-@pytest.mark.parametrize('which', AS_TOLD)
-def test_the_twin_takes_joints_of_another_type_as_it_is_told(cell, other, which):
-    make, parameters = AS_TOLD[which]
+def test_the_twin_takes_what_a_controller_feeds_back_where_it_is_told_to(cell, other):
+    make = controller(BEYOND, Q)
     theirs, stamp = other.create_publisher(type(make(S)), '/joint_states', 10), [S]
-    cell.add(ForwardKinematicsTwin, **parameters)
+    cell.add(ForwardKinematicsTwin, joint_part='feedback')
     poses = cell.collect(TWIN_POSE.name)
 
     def step():

@@ -65,27 +65,19 @@ def test_a_program_told_to_end_while_it_is_still_loading_ends_quietly(tmp_path):
     assert (done.returncode, done.stderr) == (0, b'')
 
 
-@pytest.mark.parametrize(
-    ('wrong', 'sentence'),
-    [
+def test_a_recorder_that_cannot_record_leaves_nothing(cell, tmp_path):
+    for wrong, sentence in (
         ({'topics': ['not a topic']}, "'not a topic' is no name"),
         ({'storage': 'tape'}, "got 'tape'"),
-    ],
-)
-def test_a_recorder_that_cannot_record_leaves_nothing(cell, tmp_path, wrong, sentence):
-    with pytest.raises(TwinError, match=sentence):
-        cell.add(Recorder, out=str(tmp_path / 'bag'), **wrong)
+    ):
+        with pytest.raises(TwinError, match=sentence):
+            cell.add(Recorder, out=str(tmp_path / 'bag'), **wrong)
     assert not list(tmp_path.glob('*bag*'))
 
 
 def test_simulated_time_drives_the_generator(cell):
-    cell.add(
-        TrajectoryGenerator,
-        use_sim_time=True,
-        profile='aggressive',
-        rate=100.0,
-        wait_for_subscribers=1,
-    )
+    moving = {'profile': 'aggressive', 'rate': 100.0, 'wait_for_subscribers': 1}
+    cell.add(TrajectoryGenerator, use_sim_time=True, **moving)
     states = cell.collect('/joint_states')
     clock = cell.node.create_publisher(Clock, '/clock', 10)
     cell.wait(lambda: clock.get_subscription_count() > 0, 'a subscriber of /clock')
@@ -118,25 +110,15 @@ def test_the_harness_says_which_node_died_and_why(cell):
     cell.processes.clear()
 
 
-@pytest.mark.parametrize(
-    ('kind', 'remap', 'sentence'),
-    [
-        (
-            ForwardKinematicsTwin,
-            'joint_states:=twin/tool_pose',
-            'which this node publishes itself',
-        ),
-        (ErrorInjector, 'actual/joint_states:=joint_states', 'which this node publishes itself'),
-        (
-            DeviationAnalyzer,
-            'measured/tool_pose:=twin/tool_pose',
-            'which is another input of this',
-        ),
-    ],
-)
-def test_a_remap_onto_what_the_node_has_already_is_refused(cell, kind, remap, sentence):
-    with pytest.raises(ModelError, match=sentence):
-        kind(context=cell.node.context, cli_args=['--ros-args', '-r', remap])
+def test_a_remap_onto_what_the_node_has_already_is_refused(cell):
+    itself, another = 'which this node publishes itself', 'which is another input of this'
+    for kind, remap, sentence in (
+        (ForwardKinematicsTwin, 'joint_states:=twin/tool_pose', itself),
+        (ErrorInjector, 'actual/joint_states:=joint_states', itself),
+        (DeviationAnalyzer, 'measured/tool_pose:=twin/tool_pose', another),
+    ):
+        with pytest.raises(ModelError, match=sentence):
+            kind(context=cell.node.context, cli_args=['--ros-args', '-r', remap])
 
 
 def test_a_bag_is_played_into_the_cell(cell, robot):

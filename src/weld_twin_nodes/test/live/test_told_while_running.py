@@ -11,9 +11,11 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import ReliabilityPolicy
 
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TOOL_WRENCH
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
+from weld_twin_nodes.live.contact_marker import ContactMarker
 
 pytestmark = pytest.mark.cells
 
@@ -51,6 +53,16 @@ class Bench:
             return time.monotonic() > end
 
         self.cell.wait(over, 'some time')
+
+    def load(self, force):
+        """Tell a force at the tool three times."""
+        wrench = self.cell.publisher(TOOL_WRENCH)
+        message = TOOL_WRENCH.message_class()()
+        message.header.frame_id = 'tool'
+        message.wrench.force.x = force
+        for k in range(1, 4):
+            message.header.stamp.sec = k
+            wrench.publish(message)
 
     def wait_warned(self, sentence):
         def warned():
@@ -106,13 +118,7 @@ def test_stamps_that_jump_forwards_and_that_begin_anew_are_told(bench):
 
 
 def test_a_load_that_was_refused_is_no_value_that_counts(bench):
-    wrench = bench.cell.publisher(TOOL_WRENCH)
-    message = TOOL_WRENCH.message_class()()
-    message.header.frame_id = 'tool'
-    message.wrench.force.x = float('inf')
-    for k in range(1, 4):
-        message.header.stamp.sec = k
-        wrench.publish(message)
+    bench.load(float('inf'))
     values = bench.health.values
     refused = lambda: values.get(f'/{TWIN}: /tool_wrench', {}).get('refused') == '3'  # noqa: E731
     bench.cell.wait(refused, 'the refusals')
@@ -121,12 +127,7 @@ def test_a_load_that_was_refused_is_no_value_that_counts(bench):
 
 
 def test_a_load_that_nobody_tells_any_more_is_told_with_its_age(bench):
-    wrench = bench.cell.publisher(TOOL_WRENCH)
-    message = TOOL_WRENCH.message_class()()
-    message.header.frame_id = 'tool'
-    for k in range(1, 4):
-        message.header.stamp.sec = k
-        wrench.publish(message)
+    bench.load(0.0)
     bench.wait_warned('/tool_wrench: the value that counts is ')
 
 
@@ -147,9 +148,8 @@ def test_what_is_dumped_is_whole_and_makes_the_same_node_again(bench, tmp_path):
     assert again.stop() == 0
 
 
-@pytest.mark.parametrize(
-    ('key', 'value', 'sentence'),
-    [
+def test_a_quality_of_service_that_cannot_be_had_is_refused(cell):
+    for key, value, sentence in (
         (
             '/joint_state.subscription.depth',
             10,
@@ -160,13 +160,8 @@ def test_what_is_dumped_is_whole_and_makes_the_same_node_again(bench, tmp_path):
             1,
             'the policies reliability, durability and depth',
         ),
-        ('/joint_states.subscription.reliability', 'always', 'must be reliable or best_effort'),
-    ],
-)
-def test_a_quality_of_service_that_cannot_be_had_is_refused(cell, key, value, sentence):
-    from weld_twin_core.errors import DataError
-    from weld_twin_nodes.live.contact_marker import ContactMarker
-
-    override = [Parameter(f'qos_overrides.{key}', value=value)]
-    with pytest.raises(DataError, match=sentence):
-        ContactMarker(context=cell.node.context, parameter_overrides=override)
+        ('/joint_states.subscription.reliability', 'no', 'must be reliable or best_effort'),
+    ):
+        override = [Parameter(f'qos_overrides.{key}', value=value)]
+        with pytest.raises(DataError, match=sentence):
+            ContactMarker(context=cell.node.context, parameter_overrides=override)

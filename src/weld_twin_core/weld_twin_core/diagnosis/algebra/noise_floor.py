@@ -28,7 +28,7 @@ itself, in repeats or differences, or be given with the data: a misfit looks the
 
 class NoiseFloor(NamedTuple):
     sigma: float  # standard deviation of one measured coordinate, [m]
-    independent: bool  # whether repeats or differences in time showed it, not what a model left
+    independent: bool  # whether it was given, or seen in repeats or differences
 
     @property
     def rms_m(self) -> float:
@@ -40,8 +40,8 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
     Return the noise of one measured coordinate, and whether it is independent of any model.
 
     residuals: of the best model at hand, shape (c, M). What it leaves bounds the floor from above;
-    repeated stations and third differences in time, where the data have them, are not touched by
-    its faults.
+    repeated stations and third differences in time, where the data have them, and what was given with
+    them, are not touched by its faults.
     least: noise [m] that is believed all the same, where many coordinates take it up.
     """
     estimates = []
@@ -54,7 +54,7 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
         if direct is None and recording.measured is not None:
             reported = recording.measured.sigma
             direct = None if reported is None else float(np.median(reported))
-            independent = False
+            independent &= direct is not None
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3))
         sigma = min(remaining, WIDEST) if direct is None else min(direct, remaining)

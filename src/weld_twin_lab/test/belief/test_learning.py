@@ -25,9 +25,9 @@ from weld_twin_lab.belief.trial import SHARES, mixed
 
 
 @pytest.fixture(autouse=True)
-def two_ways(monkeypatch):
-    """Part cases in two ways, not four: half the time."""
-    monkeypatch.setattr(learning, 'PARTITIONS', 2)
+def one_way(monkeypatch):
+    """Part cases in one way, not four: a quarter of the time."""
+    monkeypatch.setattr(learning, 'PARTITIONS', 1)
 
 
 def logistic(x):

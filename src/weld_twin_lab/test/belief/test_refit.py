@@ -24,8 +24,7 @@ def one_partition(monkeypatch):
     monkeypatch.setattr(learning, 'PARTITIONS', 1)
 
 
-def test_the_shipped_weights_are_what_the_kept_cases_teach(monkeypatch):
-    monkeypatch.setattr(learning, 'PARTITIONS', 2)
+def test_the_shipped_weights_are_what_the_kept_cases_teach():
     taught = study.fit(read_rows(KEPT / study.LEARNED))
     assert taught['card']['seeds'] == SHIPPED['card']['seeds']
     assert taught['sure_from'] == pytest.approx(SHIPPED['sure_from'], abs=6e-3)

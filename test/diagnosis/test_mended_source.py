@@ -34,7 +34,7 @@ def diagnosed(words, out):
 
 
 def true_points(q):
-    return np.array([tool_pose(ROBOT, row, TOOL, OFF)[:3, 3] for row in q])
+    return tool_pose(ROBOT, q, TOOL, OFF)[:, :3, 3]
 
 
 def stations(seed, count=30):
@@ -104,7 +104,7 @@ def test_a_prediction_on_the_same_source_mends_it_as_the_diagnosis_did(kind, tmp
         # Zeros and the base are the arm's: the file takes the readings as they were recorded.
         q, points = recording.joints.q, recording.measured.position
         base = corrected.T_world_base
-        own = [(base @ tool_pose(corrected, row, TOOL))[:3, 3] for row in q]
+        own = (base @ tool_pose(corrected, q, TOOL))[:, :3, 3]
         assert np.median(np.linalg.norm(own - points, axis=1)) < 6e-5
     else:
         assert abs(corrected.theta[2] - ROBOT.theta[2] - OFF[2]) < 1e-4
@@ -138,7 +138,7 @@ def test_commands_of_the_same_source_come_back_counted_as_they_came(swapped, tmp
     words = ('--robot', swapped / 'robot.yaml', '--model', swapped / 'found' / 'diagnosis.json')
     done('correct', tmp_path / 'plan', *words, '--out', tmp_path / 'better')
     better = read_recording(tmp_path / 'better', GIVEN).joints.q
-    wanted = np.array([tool_pose(ROBOT, row, TOOL)[:3, 3] for row in q])
+    wanted = tool_pose(ROBOT, q, TOOL)[:, :3, 3]
     off = np.linalg.norm(true_points(better[:, order]) - wanted, axis=1)
     before = np.linalg.norm(true_points(q) - wanted, axis=1)
     assert np.median(off) < 6e-5 < 2e-4 < np.median(before)

@@ -30,9 +30,8 @@ def answer(tmp_path_factory):
     q = 0.5 * (low + high) + rng.uniform(-0.35, 0.35, (40, 6)) * (high - low)
     tool = np.eye(4)
     tool[:3, 3] = [0.03, 0.02, 0.25]
-    off = [np.array([0.0, SCALE * row[1], ZERO, 0.0, 0.0, 0.0]) for row in q]
-    pairs = zip(q, off, strict=True)
-    points = np.array([tool_pose(ROBOT, row, tool, more)[:3, 3] for row, more in pairs])
+    off = q * [0.0, SCALE, 0.0, 0.0, 0.0, 0.0] + [0.0, 0.0, ZERO, 0.0, 0.0, 0.0]
+    points = tool_pose(ROBOT, q, tool, off)[:, :3, 3]
     t = 5.0 * np.arange(40)
     seen = Measurements(t, points + rng.normal(scale=2e-5, size=points.shape))
     given = Recording('cell', JointMotion(t, q, static=True), seen)

@@ -62,7 +62,7 @@ def postures(seed, count):
 
 def rms(robot, q, true):
     base = robot.T_world_base
-    own = np.array([(base @ tool_pose(robot, row, robot.T_flange_tool))[:3, 3] for row in q])
+    own = (base @ tool_pose(robot, q, robot.T_flange_tool))[:, :3, 3]
     return np.sqrt(((own - true) ** 2).sum(axis=1).mean())
 
 
@@ -98,7 +98,7 @@ def test_the_head_says_what_the_file_leaves_by_itself_on_postures_never_measured
     assert 0.6 * own < alone < 1.8 * own
     assert whole < 0.5 * alone
     # No better frames make the nominal arm as good: they are fitted to the very same postures.
-    bare = np.array([tool_pose(NOMINAL, row, TOOL)[:3, 3] for row in q])
+    bare = tool_pose(NOMINAL, q, TOOL)[:, :3, 3]
     one, other = (part - part.mean(axis=0) for part in (bare, true))
     left, _, right = np.linalg.svd(other.T @ one)
     turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
@@ -130,7 +130,7 @@ def uneven(tmp_path_factory):
     """An uneven gear whose name was taken out: curves without a formula stand in the model."""
     rng, q = postures(5, 40)
     real = q + np.outer(8e-4 * np.sin(4.0 * q[:, 2] + 0.4), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    points = np.array([tool_pose(NOMINAL, row, TOOL)[:3, 3] for row in real])
+    points = tool_pose(NOMINAL, real, TOOL)[:, :3, 3]
     points += rng.normal(scale=2e-5, size=points.shape)
     return diagnosed(tmp_path_factory.mktemp('uneven'), q, points, *KINDS, 'joint_curve')
 

@@ -4,6 +4,7 @@
 
 import json
 import shutil
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ KEPT, NOT_KEPT = 0, 4
 
 def measured(q, off, seed, *, still=True, clock=None):
     rng = np.random.default_rng(seed)
-    points = np.array([tool_pose(ROBOT, row, TOOL, off)[:3, 3] for row in q])
+    points = tool_pose(ROBOT, q, TOOL, off)[:, :3, 3]
     t = 5.0 * np.arange(len(q)) if clock is None else clock
     seen = Measurements(t, points + rng.normal(scale=NOISE, size=points.shape))
     return Recording('cell', JointMotion(t, q, static=still), seen)
@@ -46,6 +47,7 @@ def stations(seed, count=40):
     return NEAR + np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6))
 
 
+@cache
 def way_of(folder):
     """Return how a controller runs the program of a folder."""
     text = [(folder / name).read_bytes().decode('latin-1') for name in FILES]
@@ -251,7 +253,7 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     said = done('correct', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
     assert 'frames were fitted to the recording (base)' in said
     meant, run = way_of(MADE), way_of(tmp_path / 'out')
-    real = np.array([tool_pose(ROBOT, q, TOOL, off)[:3, 3] for q in run.joints[::5]])
+    real = tool_pose(ROBOT, run.joints[::5], TOOL, off)[:, :3, 3]
     apart = np.linalg.norm(real[:, None] - meant.tool[None], axis=2).min(axis=1)
     true = np.sqrt((apart**2).mean())
     after = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']['after']
@@ -261,7 +263,7 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
 def off_the_path(folder):
     """Return how far the real tool is from the path that was meant, at its worst [m]."""
     meant, run = way_of(MADE), way_of(folder)
-    real = np.array([tool_pose(ROBOT, q, TOOL, OFF)[:3, 3] for q in run.joints[::5]])
+    real = tool_pose(ROBOT, run.joints[::5], TOOL, OFF)[:, :3, 3]
     way = np.diff(meant.tool, axis=0)
     off = real[:, None] - meant.tool[:-1]
     share = (off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-18)

@@ -190,7 +190,7 @@ def _off(seam: SealedSeam, text: str, meant: Driven) -> tuple[float, float]:
     moved = np.stack([np.interp(along.way, ends, by) for by in moved.T], axis=1)
     # Between the places it works out, a controller turns its joints evenly: the tool goes in a bow.
     tool = np.array(seam.robot.T_flange_tool)
-    believed = np.array([tool_pose(seam.robot, row, tool)[:3, 3] for row in q[keep]])
+    believed = tool_pose(seam.robot, q[keep], tool)[:, :3, 3]
     wanted = believed - np.stack([np.interp(at, along.clock, by) for by in moved.T], axis=1)
     real = (seam.ran(t, q).position[keep] - base[:3, 3]) @ base[:3, :3]
     off = np.linalg.norm(real - wanted, axis=1)

@@ -22,6 +22,8 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.robot import Robot
 
+Lengths = np.ndarray | float
+STILL = np.eye(4)
 CLOSED, REACHED = 1e-11, 1e-7
 """Gap [m, rad] at which there is no further round, and up to which a pose counts as reached."""
 ROUNDS = 50
@@ -30,34 +32,45 @@ LONGEST = 0.3
 """Most that any joint turns in a round [rad]: farther away the tangent tells nothing."""
 
 
-def along(axis: int, length: float) -> np.ndarray:
-    """Return a shift along an axis, shape (4, 4)."""
-    out = np.eye(4)
-    out[axis, 3] = length
+def along(axis: int, length: Lengths) -> np.ndarray:
+    """Return shifts along an axis, shape (..., 4, 4)."""
+    out = _still(length)
+    out[..., axis, 3] = length
     return out
 
 
-def about(axis: int, angle: float) -> np.ndarray:
-    """Return a turn about an axis, shape (4, 4)."""
-    out = np.eye(4)
+def about(axis: int, angle: Lengths) -> np.ndarray:
+    """Return turns about an axis, shape (..., 4, 4)."""
+    out = _still(angle)
     one, two = (axis + 1) % 3, (axis + 2) % 3
-    out[one, one] = out[two, two] = np.cos(angle)
-    out[two, one] = np.sin(angle)
-    out[one, two] = -out[two, one]
+    out[..., one, one] = out[..., two, two] = np.cos(angle)
+    out[..., two, one] = np.sin(angle)
+    out[..., one, two] = -out[..., two, one]
+    return out
+
+
+def _still(values: Lengths) -> np.ndarray:
+    out = np.empty((*np.shape(values), 4, 4))
+    out[...] = STILL
     return out
 
 
 def tool_pose(
     robot: Robot, q: np.ndarray, tool: np.ndarray, offsets: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the pose of the tool; ``offsets``: how much further each joint really stands."""
+    """
+    Return the poses of the tool at joints (..., n), shape (..., 4, 4).
+
+    offsets: how much further each joint really stands, shape (n,) or of the joints.
+    """
     return np.asarray(_frames(robot, q + offsets)[-1] @ tool)
 
 
 def _frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
-    """Return the frame that each joint turns in, and the last frame, each of shape (4, 4)."""
-    at, out = np.eye(4), []
-    rows = zip(robot.a, robot.alpha, robot.d, robot.theta + q, strict=True)
+    """Return the frame that each joint turns in, and the last frame, each of shape (..., 4, 4)."""
+    angles = np.moveaxis(robot.theta + q, -1, 0)
+    at, out = _still(angles[0]), []
+    rows = zip(robot.a, robot.alpha, robot.d, angles, strict=True)
     for a, alpha, d, theta in rows:
         if robot.convention == 'standard':
             out.append(at)
@@ -146,8 +159,8 @@ def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Drive
         else:
             end = tool_pose(robot, place, tool) if place.ndim == 1 else place
             way = _straight(robot, q, end, tool)
-        for step in way:
-            at += _length(robot, q, step, tool) / speed if k else 0.0
+        for step, length in zip(way, _lengths(robot, [q, *way], tool), strict=True):
+            at += length / speed if k else 0.0
             q = step
             if not clock or at > clock[-1] + 1e-6:
                 clock.append(at)
@@ -155,7 +168,7 @@ def driven(robot: Robot, moves: Moves, start: np.ndarray, speed: float) -> Drive
         ends.append(at)
     t, passed = _eased(np.array(clock))
     rows = np.stack([np.interp(passed, clock, column) for column in np.array(joints).T], axis=1)
-    believed = np.array([tool_pose(robot, row, tool)[:3, 3] for row in rows])
+    believed = tool_pose(robot, rows, tool)[:, :3, 3]
     return Driven(t, rows, believed, passed, np.interp(ends, passed, t))
 
 
@@ -177,7 +190,7 @@ def _by_joints(
     robot: Robot, q: np.ndarray, place: np.ndarray, tool: np.ndarray
 ) -> list[np.ndarray]:
     end = place if place.ndim == 1 else joints_for(robot, place, tool, q)
-    count = max(int(np.ceil(_length(robot, q, end, tool) / FINE)), 1)
+    count = max(int(np.ceil(_lengths(robot, [q, end], tool)[0] / FINE)), 1)
     return [q + share * (end - q) for share in np.arange(1, count + 1) / count]
 
 
@@ -196,14 +209,16 @@ def _straight(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) ->
     return out
 
 
-def _length(robot: Robot, q: np.ndarray, end: np.ndarray, tool: np.ndarray) -> float:
-    first, last = tool_pose(robot, q, tool), tool_pose(robot, end, tool)
-    turn = Rotation.from_matrix(last[:3, :3] @ first[:3, :3].T).as_rotvec()
-    return _size(last[:3, 3] - first[:3, 3], turn)
+def _lengths(robot: Robot, stops: Sequence[np.ndarray], tool: np.ndarray) -> np.ndarray:
+    """Return how long the way from each of some joint positions (M, n) to the next is, (M - 1,)."""
+    poses = tool_pose(robot, np.array(stops), tool)
+    turned = poses[1:, :3, :3] @ np.swapaxes(poses[:-1, :3, :3], -1, -2)
+    return _size(np.diff(poses[:, :3, 3], axis=0), Rotation.from_matrix(turned).as_rotvec())
 
 
-def _size(way: np.ndarray, turn: np.ndarray) -> float:
-    return float(max(np.linalg.norm(way), TURNING * np.linalg.norm(turn)))
+def _size(way: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    far, round_ = np.linalg.norm(way, axis=-1), np.linalg.norm(turn, axis=-1)
+    return np.asarray(np.maximum(far, TURNING * round_))
 
 
 def evenly(made: Driven, rate: float, rest: float = REST) -> tuple[np.ndarray, np.ndarray]:

@@ -75,7 +75,12 @@ def plain(value: Any) -> Any:
     """Return a value with lists for arrays, texts for keys, and None for what is not finite."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        # A posterior has rows of numbers by the hundred.
+        if {*map(type, value)} == {float} and all(map(isfinite, value)):
+            return [*value]
         return [plain(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()

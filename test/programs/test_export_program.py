@@ -25,9 +25,9 @@ CELLS = {
 PULSES = ('--pulses-per-degree', '1000,-1200,1100,900,-800,700')
 
 
-def exported(language, path, tmp_path, *more):
+def exported(language, path, tmp_path, *more, name='measure'):
     robot, suffix, reader, rounding = CELLS[language]
-    out = tmp_path / f'measure.{suffix}'
+    out = tmp_path / f'{name}.{suffix}'
     words = ('export', 'program', path, '--robot', robot, '--controller', language)
     done(*words, *(PULSES if language == 'inform' else ()), *more, '--out', out)
     text = out.read_bytes().decode('latin-1')
@@ -90,6 +90,13 @@ def test_a_name_is_a_comment_and_no_statement(language, tmp_path):
     path, _ = stations(wt.load(CELLS[language][0]), tmp_path)
     _, text, _, _ = exported(language, path.rename(tmp_path / name), tmp_path)
     assert not re.search(r'^\W*DO\[1\]', text.replace(';', '\n'), re.M)
+
+
+@pytest.mark.parametrize('language', CELLS)
+def test_a_program_has_the_letters_that_controllers_have(language, tmp_path):
+    path, _ = stations(wt.load(CELLS[language][0]), tmp_path)
+    _, text, _, _ = exported(language, path, tmp_path, name='Prüfung 日本')
+    assert text.isascii()
 
 
 def test_names_that_would_end_a_line_are_refused(tmp_path):

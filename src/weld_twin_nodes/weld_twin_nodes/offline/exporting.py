@@ -271,5 +271,5 @@ def _singular(robot: Robot, q: Array) -> list[str]:
 
 
 def _name(text: str) -> str:
-    name = re.sub(r'\W', '_', text)
+    name = re.sub(r'\W', '_', text, flags=re.ASCII)  # no controller has other letters
     return name if re.match(r'[A-Za-z]', name) else f'p_{name}'

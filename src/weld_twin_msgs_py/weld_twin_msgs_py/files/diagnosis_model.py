@@ -24,8 +24,11 @@ from .yaml_file import whole
 
 SCHEMAS = tuple(f'weld_twin/diagnosis/{version}' for version in (1, 2))
 """Versions that are read."""
-PARTS = {'model': dict, 'verdict': dict, 'unsound': list, 'posterior': dict, 'inputs': list}
+_DICTS, _LISTS = ('model', 'verdict', 'posterior', 'gap', 'shrink'), ('unsound', 'inputs')
+PARTS = {**dict.fromkeys(_DICTS, dict), **dict.fromkeys(_LISTS, list)}
 """What parts of a diagnosis are; each may be missing, or null."""
+INPUT = {'use', 'path', 'sha256'}
+"""Keys of each of the inputs."""
 SIZE_LIMIT = 64_000_000
 """Bytes; a diagnosis of thousands of stations is some hundred kilobytes."""
 
@@ -50,10 +53,16 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
             f"'{path}' is no diagnosis of this version: its schema is {schema!r}, known are "
             f'{" and ".join(SCHEMAS)}; give the diagnosis.json that weld-twin diagnose wrote'
         )
-    for part, kind in PARTS.items():
-        if not isinstance(data.get(part), kind | type(None)):
+    for part in PARTS:
+        if not _means_something(part, data.get(part)):
             raise ModelError(f"diagnosis '{path}': {part} was changed and means nothing any more")
     return data
+
+
+def _means_something(part: str, item: Any) -> bool:
+    if part == 'inputs' and isinstance(item, list):
+        return all(isinstance(each, dict) and each.keys() >= INPUT for each in item)
+    return isinstance(item, PARTS[part] | type(None))
 
 
 def read_model(robot: Robot, path: Path | str) -> Model:
@@ -75,7 +84,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         alone = _alone(model.get('alone'), robot)
         counted = counted_of(model, robot)
         named = _named(content.get('verdict'), model.get('found', []))
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
     except (ModelError, DataError) as error:
         raise ModelError(f"diagnosis '{path}': {error}") from None

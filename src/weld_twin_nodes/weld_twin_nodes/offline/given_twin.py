@@ -82,7 +82,7 @@ def by_effort(path: Path | str) -> bool:
 def entries_of(content: Mapping[str, Any]) -> list[Any]:
     """Return what the model of a diagnosis knew and found, as entries of an effects file."""
     model = content.get('model') or {}
-    return [*model.get('known', ()), *model.get('found', ())]
+    return [*(model.get('known') or ()), *(model.get('found') or ())]
 
 
 def other_readings(content: Mapping[str, Any]) -> str:

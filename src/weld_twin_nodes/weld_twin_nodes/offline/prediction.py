@@ -122,7 +122,7 @@ def predictor(
         return Predictor(build_twin(robot, path))
     model = read_model(robot, path)
     own = hashed('recording', bag).sha256
-    known = [item['sha256'] for item in content.get('inputs', []) if item['use'] == 'recording']
+    known = [item['sha256'] for item in content.get('inputs') or () if item['use'] == 'recording']
     place = known.index(own) if own in known else None
     if setup is not None:
         load_model(robot, path, setup - 1)

@@ -30,7 +30,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem, frames_name
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects.dated import of_the_robot
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 
@@ -157,6 +157,19 @@ class Verification:
         }
 
 
+def _of_diagnosis(content: Mapping[str, Any]) -> tuple[float, float, Promise]:
+    """Return the gap that a diagnosis found, its noise, and what is left by its promise [m]."""
+    try:
+        gap, shrink = content['gap'], content['shrink']
+        low, high = (float(end) * float(shrink['rms_before_m']) for end in shrink['ci95'])
+        promise = Promise(float(shrink['rms_after_m']), low, high)
+        return float(gap['rms_m']), float(gap['noise_floor_m']), promise
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(
+            f'gap or shrink of the diagnosis means nothing ({error}); diagnose again'
+        ) from None
+
+
 def verified(
     content: Mapping[str, Any],  # of the diagnosis
     model: Model,
@@ -175,17 +188,14 @@ def verified(
     offs = seen.fitted(wanted)
     share = effective_share(offs.left.ravel(), (3,), (len(offs.left),))
     rms = float(np.sqrt((offs.whole**2).sum(axis=1).mean()))
-    gap = content['gap']
-    _refuse_elsewhere(rms, float(gap['rms_m']), align)
+    before, noise, promise = _of_diagnosis(content)
+    _refuse_elsewhere(rms, before, align)
     if wanted is None:
-        shrink = content['shrink']
-        low, high = (float(end) * shrink['rms_before_m'] for end in shrink['ci95'])
-        promise = Promise(float(shrink['rms_after_m']), low, high)
-        measured = Measured(rms, rms, float(gap['noise_floor_m']))
+        measured = Measured(rms, rms, noise)
     else:
         promise = _of_program(correction or {})
         own = seen.noise_m(offs.every)
-        noise = float(gap['noise_floor_m']) if own is None else own
+        noise = noise if own is None else own
         measured = Measured.without_noise(rms, noise, share * offs.whole.size)
     return Verification(
         promise,

@@ -13,6 +13,7 @@ from command_line import done, refused
 from scipy.stats import chi2
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.effects import Backlash
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
@@ -342,6 +343,36 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
     (tmp_path / 'spoilt.json').write_text(json.dumps(data))
     words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
     assert reason in refused('simulate', cell / 'second', *words)
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'reason'),
+    [
+        (lambda d: d['verdict'].update(causes=[7]), 'the model of diagnosis'),
+        (lambda d: d['model']['alone'].update(whole_recorded_m=None), 'the model of diagnosis'),
+        (lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs was changed'),
+        (lambda d: d.update(shrink=None), 'shrink of the diagnosis means nothing'),
+        (lambda d: d['gap'].pop('noise_floor_m'), 'shrink of the diagnosis means nothing'),
+    ],
+)
+def test_a_part_that_somebody_changed_is_one_line(cell, found, tmp_path, spoil, reason):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    spoil(data)
+    (tmp_path / 'spoilt.json').write_text(json.dumps(data))
+    words = ('verify', cell / 'second', '--robot', 'ur5', '--model', tmp_path / 'spoilt.json')
+    assert reason in refused(*words)
+
+
+def test_a_diagnosis_of_the_first_version_is_still_held_against_a_recording(cell, found, tmp_path):
+    data = json.loads((found / 'diagnosis.json').read_text())
+    data['schema'], data['inputs'] = 'weld_twin/diagnosis/1', None
+    del data['model']['robot'], data['model']['kinematics'], data['posterior']
+    (tmp_path / 'old.json').write_text(json.dumps(data))
+    more = ('--model', tmp_path / 'old.json', '--robot', 'ur5', '--out')
+    done('simulate', cell / 'second', *more, tmp_path / 'predicted')
+    weld_twin('verify', cell / 'second', *more, tmp_path / 'out')
+    written = json.loads((tmp_path / 'out' / 'verification.json').read_text())
+    assert (written['robot'], written['kinematics']) == ('ur5', fingerprint(load('ur5')))
 
 
 def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_path):

@@ -5,6 +5,7 @@
 from pathlib import Path
 from typing import Any
 
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
@@ -43,14 +44,14 @@ def run(given: Given) -> int:
     print(*result_lines(result), sep='\n')
     if given.out:
         refuse_changed(inputs)
-        arm = content['model']
+        arm = content['model']  # of an older version it does not name its robot
         entry = result.as_dict() | {
-            'robot': arm['robot'],
-            'kinematics': arm['kinematics'],
+            'robot': arm.get('robot', robot.name),
+            'kinematics': arm.get('kinematics', fingerprint(robot)),
             'epoch_ns': recording.epoch_ns,
             'inputs': [item.as_dict() for item in inputs],
         }
-        given.write_results(RESULT, verification_page(result, str(arm['robot']), inputs), entry)
+        given.write_results(RESULT, verification_page(result, str(entry['robot']), inputs), entry)
         given.say_page()
     return 0 if result.kept else NOT_KEPT
 
@@ -60,7 +61,7 @@ def _robot(given: Given, content: dict[str, Any]) -> Robot:
     links = given.links[:2]
     if given.robot:
         return load_robot(given.robot, *links)
-    files = [item['path'] for item in content.get('inputs', []) if item.get('use') == 'robot']
+    files = [item['path'] for item in content.get('inputs') or () if item.get('use') == 'robot']
     name = files[0] if files else str((content.get('model') or {}).get('robot'))
     try:
         return load_robot(name, *links)
@@ -79,7 +80,7 @@ def _correction(folder: str, model: str) -> dict[str, Any]:
             f"'{path}' is no correction; give the folder that weld-twin correct --model wrote"
         )
     (own,) = inputs_of(model=model)
-    made = [item['sha256'] for item in content.get('inputs', ()) if item['use'] == own.use]
+    made = [item['sha256'] for item in content.get('inputs') or () if item['use'] == own.use]
     if made not in ([], [own.sha256]):
         raise DataError(
             f"the program of '{path}' was corrected by another diagnosis than '{model}'; give that "

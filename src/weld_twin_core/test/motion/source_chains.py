@@ -34,30 +34,26 @@ def ur(shoulder, forearm, wrist_1, wrist_2, wrist_3):
     return joints, (NONE, NONE)
 
 
+def parallel(text, tool):
+    """Return a chain whose frames are all parallel at zero, from the xyz and the axis of every joint."""
+    joints = []
+    for row in text.split('; '):
+        *xyz, axis = row.split()
+        way = {'x': X, 'y': Y, 'z': Z}[axis[-1]]
+        joints.append((tuple(map(float, xyz)), NONE, minus(way) if axis[0] == '-' else way))
+    return joints, tool
+
+
 def abb(height, forward, arm, elbow, forearm, flange):
-    """Return a chain of the xacro files of abb_*_support: all frames parallel at zero."""
-    joints = [
-        ((0, 0, height), NONE, Z),
-        ((forward, 0, 0), NONE, Y),
-        ((0, 0, arm), NONE, Y),
-        ((0, 0, elbow), NONE, X),
-        ((forearm, 0, 0), NONE, Y),
-        ((flange, 0, 0), NONE, X),
-    ]
-    return joints, (NONE, (0, pi / 2, 0))
+    """Return a chain of the xacro files of abb_*_support."""
+    body = f'0 0 {height} z; {forward} 0 0 y; 0 0 {arm} y; 0 0 {elbow} x'
+    return parallel(f'{body}; {forearm} 0 0 y; {flange} 0 0 x', (NONE, (0, pi / 2, 0)))
 
 
 def kuka(height, forward, arm, forearm, flange):
     """Return a chain of the xacro files of kuka_kr16_support."""
-    joints = [
-        ((0, 0, height), NONE, minus(Z)),
-        ((forward, 0, 0), NONE, Y),
-        ((arm, 0, 0), NONE, Y),
-        (forearm, NONE, minus(X)),
-        (NONE, NONE, Y),
-        (NONE, NONE, minus(X)),
-    ]
-    return joints, ((flange, 0, 0), (0, pi / 2, 0))
+    body = f'0 0 {height} -z; {forward} 0 0 y; {arm} 0 0 y; {forearm} -x'
+    return parallel(f'{body}; 0 0 0 y; 0 0 0 -x', ((flange, 0, 0), (0, pi / 2, 0)))
 
 
 CHAINS = {
@@ -66,16 +62,9 @@ CHAINS = {
     'ur10e': ur(0.1807, -0.6127, (-0.57155, 0, 0.17415), -0.11985, 0.11655),
     'ur16e': ur(0.1807, -0.4784, (-0.36, 0, 0.17415), -0.11985, 0.11655),
     'ur20': ur(0.2363, -0.862, (-0.7287, 0, 0.201), -0.1593, 0.1543),
-    'yaskawa_ma2010': (
-        [
-            ((0, 0, 0.505), NONE, Z),
-            ((0.15, 0, 0), NONE, Y),
-            ((0, 0, 0.76), NONE, minus(Y)),
-            ((0, 0, 0.2), NONE, minus(X)),
-            ((1.082, 0, 0), NONE, minus(Y)),
-            (NONE, NONE, minus(X)),
-        ],
-        # The source has the flange's axes parallel to those of the base; here as the AR2010.
+    # The source has the flange's axes parallel to those of the base; here as the AR2010.
+    'yaskawa_ma2010': parallel(
+        '0 0 0.505 z; 0.15 0 0 y; 0 0 0.76 -y; 0 0 0.2 -x; 1.082 0 0 -y; 0 0 0 -x',
         ((0.1, 0, 0), (pi, -pi / 2, 0)),
     ),
     'yaskawa_ma1440': (
@@ -102,15 +91,9 @@ CHAINS = {
         # Flange and tool0 of the source, one after the other, are half a turn about x.
         (NONE, (pi, 0, 0)),
     ),
-    'fanuc_m10id12': (
-        [
-            ((0, 0, 0.3035), NONE, Z),
-            ((0.075, 0, 0.1465), NONE, Y),
-            ((0, 0, 0.64), NONE, minus(Y)),
-            ((0.2555, 0, 0.195), NONE, minus(X)),
-            ((0.4445, -0.0572, 0), NONE, minus(Y)),
-            ((0.075, 0.0572, 0), NONE, minus(X)),
-        ],
+    'fanuc_m10id12': parallel(
+        '0 0 0.3035 z; 0.075 0 0.1465 y; 0 0 0.64 -y; '
+        '0.2555 0 0.195 -x; 0.4445 -0.0572 0 -y; 0.075 0.0572 0 -x',
         (NONE, (pi, -pi / 2, 0)),
     ),
     'fanuc_m20id25': (
@@ -124,60 +107,33 @@ CHAINS = {
         ],
         (NONE, NONE),
     ),
-    'fanuc_m10ia': (
-        [
-            (NONE, NONE, Z),
-            ((0.15, -0.04, 0.45), NONE, Y),
-            ((0, -0.0225, 0.6), NONE, minus(Y)),
-            ((0.1805, 0.0625, 0.2), NONE, minus(X)),
-            ((0.4595, -0.0565, 0), NONE, minus(Y)),
-            ((0.1, 0.0565, 0), NONE, minus(X)),
-        ],
+    'fanuc_m10ia': parallel(
+        '0 0 0 z; 0.15 -0.04 0.45 y; 0 -0.0225 0.6 -y; '
+        '0.1805 0.0625 0.2 -x; 0.4595 -0.0565 0 -y; 0.1 0.0565 0 -x',
         (NONE, (pi, -pi / 2, 0)),
     ),
     'abb_irb120': abb(0.29, 0, 0.27, 0.07, 0.302, 0.072),
     'abb_irb1600': abb(0.4865, 0.15, 0.475, 0, 0.6, 0.065),
-    'kuka_kr6_r900': kuka(0.4, 0.025, 0.455, (0.42, 0, 0.035), 0.08),
+    'kuka_kr6_r900': kuka(0.4, 0.025, 0.455, '0.42 0 0.035', 0.08),
     'abb_irb2600_12_165': abb(0.445, 0.15, 0.7, 0.115, 0.795, 0.085),
     'abb_irb4600_40_255': abb(0.495, 0.175, 1.095, 0.175, 1.27, 0.135),
-    'staubli_tx2_90l': (
-        [
-            ((0, 0, 0.478), NONE, Z),
-            ((0.05, 0, 0), NONE, Y),
-            ((0, 0.05, 0.5), NONE, Y),
-            (NONE, NONE, Z),
-            ((0, 0, 0.55), NONE, Y),
-            ((0, 0, 0.1), NONE, Z),
-        ],
+    'staubli_tx2_90l': parallel(
+        '0 0 0.478 z; 0.05 0 0 y; 0 0.05 0.5 y; 0 0 0 z; 0 0 0.55 y; 0 0 0.1 z',
         (NONE, NONE),
     ),
-    'kuka_iiwa14': (
-        [
-            ((0, 0, 0.1475), NONE, Z),
-            ((0, -0.01, 0.2125), NONE, Y),
-            ((0, 0.01, 0.228), NONE, Z),
-            ((0, 0.0105, 0.192), NONE, minus(Y)),
-            ((0, -0.0105, 0.2075), NONE, Z),
-            ((0, -0.0707, 0.1925), NONE, Y),
-            ((0, 0.0707, 0.091), NONE, Z),
-        ],
+    'kuka_iiwa14': parallel(
+        '0 0 0.1475 z; 0 -0.01 0.2125 y; 0 0.01 0.228 z; 0 0.0105 0.192 -y; '
+        '0 -0.0105 0.2075 z; 0 -0.0707 0.1925 y; 0 0.0707 0.091 z',
         ((0, 0, 0.035), NONE),
     ),
-    'mecademic_meca500': (
-        [
-            # The source begins 12.498 mm behind axis 1; the controller's base is on the axis.
-            ((0, 0, 0.091), NONE, Z),
-            ((0, 0, 0.044), NONE, Y),
-            ((0, 0, 0.135), NONE, Y),
-            ((0, 0, 0.038), NONE, X),
-            ((0.12, 0, 0), NONE, Y),
-            ((0.07, 0, 0), NONE, X),
-        ],
-        # The source has no flange frame; the controller tells 0, 90, 0 degrees at zero.
+    # The source begins 12.498 mm behind axis 1; the controller's base is on the axis.
+    # The source has no flange frame; the controller tells 0, 90, 0 degrees at zero.
+    'mecademic_meca500': parallel(
+        '0 0 0.091 z; 0 0 0.044 y; 0 0 0.135 y; 0 0 0.038 x; 0.12 0 0 y; 0.07 0 0 x',
         (NONE, (0, pi / 2, 0)),
     ),
-    'kuka_kr16_2': kuka(0.675, 0.26, 0.68, (0.67, 0, -0.035), 0.158),
-    'kuka_kr16_r1610_2': kuka(0.52, 0.16, 0.78, (0.655, 0, 0.15), 0.153),
+    'kuka_kr16_2': kuka(0.675, 0.26, 0.68, '0.67 0 -0.035', 0.158),
+    'kuka_kr16_r1610_2': kuka(0.52, 0.16, 0.78, '0.655 0 0.15', 0.153),
 }
 
 

@@ -140,11 +140,3 @@ def test_the_campaign_keeps_its_result_and_touches_no_other_file(tmp_path, capsy
     assert (tmp_path / 'mine').read_text() == 'keep'
     assert main([*words[:3], 'poems', *words[4:]]) == 2
     assert "no kind of file is called 'poems'" in capsys.readouterr().err
-
-
-def test_an_effect_of_a_number_too_large_is_refused(tmp_path):
-    (tmp_path / 'effects.yaml').write_text(
-        f'- {{effect: backlash, joint: elbow_joint, width: {"1" * 400}}}'
-    )
-    with pytest.raises(ModelError):
-        read_effects(tmp_path / 'effects.yaml', catalog.load('ur5'))

@@ -7,72 +7,49 @@ from numbers import Real
 
 import numpy as np
 import pytest
+import yaml
 from diagnosis_cells import solved
 
 from weld_twin_core.effects import effect_from_mapping
 
-NUMBER, TEXT, FLAG = Real, str, bool
-JOINT = (str, type(None))
-SCHEMA = {
-    'schema': TEXT,
-    'gap': {
-        'rms_m': NUMBER,
-        'mean_m': NUMBER,
-        'max_m': NUMBER,
-        'orientation_rms_rad': (Real, type(None)),
-        'samples': int,
-        'noise_floor_m': NUMBER,
-    },
-    'where': {
-        'joints': [{'name': TEXT, 'share': NUMBER}],
-        'regimes': dict.fromkeys(
-            ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time'), NUMBER
-        ),
-        'path': [{'t_start': NUMBER, 't_end': NUMBER, 'share': NUMBER, 'rms_m': NUMBER}],
-        'direction': {'along_m': NUMBER, 'across_m': NUMBER, 'normal_m': NUMBER},
-    },
-    'verdict': {
-        'status': TEXT,
-        'effects': [{'effect': TEXT, 'joint': JOINT, 'parameters': dict, 'std': dict}],
-        'confidence': NUMBER,
-        'learned': NUMBER,
-        'sure': FLAG,
-        'complete': NUMBER,
-        'indistinguishable': [[{'effect': TEXT, 'joint': JOINT}]],
-        'causes': [
-            {
-                'probability': NUMBER,
-                'sure': FLAG,
-                'effect': (int, type(None)),
-                'rest': FLAG,
-                'place': [{'at': TEXT, 'probability': NUMBER}],
-                'dependence': [{'on': TEXT, 'probability': NUMBER}],
-                'name': [{'effect': TEXT, 'joint': JOINT, 'probability': NUMBER}],
-                'share': NUMBER,
-                'share_ci90': [NUMBER],
-            }
-        ],
-    },
-    'candidates': [
-        {
-            'effect': TEXT,
-            'joint': JOINT,
-            'probability': NUMBER,
-            'rms_after_m': NUMBER,
-            'shrink': NUMBER,
-        }
-    ],
-    'shrink': {
-        'rms_before_m': NUMBER,
-        'rms_after_m': NUMBER,
-        'ratio': NUMBER,
-        'ci95': [NUMBER],
-        'elsewhere_ci95': [NUMBER],
-        'held_out': TEXT,
-    },
-    'unexplained': {'rms_m': NUMBER, 'above_noise': FLAG, 'structure': [TEXT]},
-    'next_experiment': (dict, type(None)),
-}
+TYPES = {
+    'number': Real, 'text': str, 'flag': bool, 'whole': int, 'mapping': dict, 'nothing': type(None)
+}  # fmt: skip
+SCHEMA = yaml.safe_load("""
+schema: text
+gap: {rms_m: number, mean_m: number, max_m: number, orientation_rms_rad: number or nothing,
+      samples: whole, noise_floor_m: number}
+where:
+  joints: [{name: text, share: number}]
+  regimes: {static: number, reversal: number, speed: number, acceleration: number, load: number,
+            temperature: number, time: number}
+  path: [{t_start: number, t_end: number, share: number, rms_m: number}]
+  direction: {along_m: number, across_m: number, normal_m: number}
+verdict:
+  status: text
+  effects: [{effect: text, joint: text or nothing, parameters: mapping, std: mapping}]
+  confidence: number
+  learned: number
+  sure: flag
+  complete: number
+  indistinguishable: [[{effect: text, joint: text or nothing}]]
+  causes:
+  - probability: number
+    sure: flag
+    effect: whole or nothing
+    rest: flag
+    place: [{at: text, probability: number}]
+    dependence: [{'on': text, probability: number}]
+    name: [{effect: text, joint: text or nothing, probability: number}]
+    share: number
+    share_ci90: [number]
+candidates:
+- {effect: text, joint: text or nothing, probability: number, rms_after_m: number, shrink: number}
+shrink: {rms_before_m: number, rms_after_m: number, ratio: number, ci95: [number],
+         elsewhere_ci95: [number], held_out: text}
+unexplained: {rms_m: number, above_noise: flag, structure: [text]}
+next_experiment: mapping or nothing
+""")
 ANSWERS = {
     'play': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {}),
     'tool': ((('tool_pose', 'xyz', (4e-4, -3e-4, 2e-4), 'rotvec', (6e-4, 0.0, -8e-4)),), {}),
@@ -113,9 +90,9 @@ def faults(value, schema, path='diagnosis'):
         if type(value) is not list:
             return [f'{path} is no list']
         return [f for k, v in enumerate(value) for f in faults(v, schema[0], f'{path}[{k}]')]
-    if schema is Real and isinstance(value, bool):
-        return [f'{path} is a flag']
-    return [] if isinstance(value, schema) else [f'{path} is {value!r}']
+    kinds = tuple(TYPES[word] for word in schema.split(' or '))
+    right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
+    return [] if right else [f'{path} is {value!r}']
 
 
 def test_the_answer_has_every_key_of_the_public_schema_in_its_type(answer):

@@ -126,6 +126,12 @@ def test_exponents_without_a_point_are_numbers(tmp_path):
     assert (robot.a[0], robot.alpha[0]) == (0.001, -2.0)
 
 
+def one_joint(keys='', **more):
+    """Return a robot file of one joint, with more keys of it and of the robot."""
+    own = ''.join(f'{key}: {value}\n' for key, value in more.items())
+    return f'name: r\n{own}joints:\n- {{name: j{keys}}}\n'
+
+
 BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
 
 
@@ -138,19 +144,19 @@ BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
         (BOMB, "robot file '{}' line 2: aliases are not accepted"),
         ('name: !!python/object:os.system x\n', 'could not determine a constructor'),
         (
-            'name: r\njoints:\n- {name: j, alpha: 90}\n',
-            "robot file '{}': joint 'j': alpha is 90, which looks like degrees in a radian field",
+            one_joint(', alpha: 90'),
+            "robot file '{}': joint 'j': alpha is 90, which looks like degrees",
         ),
-        ('name: r\njoints:\n- {name: j, lower: -170, upper: 170}\n', 'lower is -170, which looks'),
-        ('name: r\njoints:\n- {name: j, a: 425}\n', 'a is 425, which looks like millimetres'),
+        (one_joint(', lower: -170, upper: 170'), 'lower is -170, which looks'),
+        (one_joint(', a: 425'), 'a is 425, which looks like millimetres'),
         (
-            'name: r\ntool: {xyz: [0, 0, 250], quat_xyzw: [0, 0, 0, 1]}\njoints:\n- {name: j}\n',
-            'tool is 250 away, which looks like millimetres',
+            one_joint(tool='{xyz: [0, 0, 250], quat_xyzw: [0, 0, 0, 1]}'),
+            'tool is 250 away, which looks',
         ),
-        ('name: r\npayload: {mass: 2, com: [0, 0, 80]}\njoints:\n- {name: j}\n', 'com is 80 away'),
-        ('name: r\ngravity: [0, 0, -1]\njoints:\n- {name: j}\n', 'gravity is 1; it is in m/s^2'),
-        ('name: r\ngravity: [0, 0, -9810]\njoints:\n- {name: j}\n', 'gravity is 9810; it is in'),
-        ('name: r\njoints:\n- {name: j, b: 1}\n', "joint 'j' has the unknown key 'b'"),
+        (one_joint(payload='{mass: 2, com: [0, 0, 80]}'), 'com is 80 away'),
+        (one_joint(gravity='[0, 0, -1]'), 'gravity is 1; it is in m/s^2'),
+        (one_joint(gravity='[0, 0, -9810]'), 'gravity is 9810; it is in'),
+        (one_joint(', b: 1'), "joint 'j' has the unknown key 'b'"),
         ('', 'a robot file must be a mapping of keys, got NoneType'),
         ('[' * 100_000, 'nested too deeply'),
         ('x' * 1_100_000, 'is larger than 1 MB'),
@@ -172,6 +178,11 @@ def urdf(*joints):
     return '<robot name="r">' + LINKS + ''.join(JOINT.format(*j) for j in joints) + '</robot>'
 
 
+def two(*ends):
+    """A URDF of two joints between these links."""
+    return urdf(('j', 'revolute', *ends[:2], ''), ('k', 'revolute', *ends[2:], ''))
+
+
 def turning(kind='revolute', inside=''):
     """A URDF whose first joint is odd and whose second is sound."""
     return urdf(('j', kind, 'a', 'b', inside), ('k', 'revolute', 'b', 'c', ''))
@@ -183,36 +194,24 @@ def turning(kind='revolute', inside=''):
         ('<robot', 'is not well-formed XML'),
         ('<!DOCTYPE r [<!ENTITY a "b">]><robot name="r"/>', 'has a document type or entities'),
         ('<model name="r"/>', 'its outermost tag is <model>, not <robot>'),
-        (
-            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:m/></robot>',
-            'is a xacro file',
-        ),
+        ('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:m/></robot>', 'is a xacro file'),
         ('<robot name="r"/>', 'there is no link in it'),
-        (
-            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'a', 'c', '')),
-            'the chain has several ends (b, c); say which with --tip-link',
-        ),
+        (two('a', 'b', 'a', 'c'), 'the chain has several ends (b, c); say which with --tip-link'),
         (urdf(('j', 'fixed', 'a', 'b', ''), ('k', 'fixed', 'b', 'c', '')), 'no joint moves'),
         (turning('floating'), "joint 'j' is floating"),
         (turning(inside='<axis xyz="0 0 0"/>'), "the axis of joint 'j' has no direction"),
         (turning(inside='<mimic joint="k"/>'), "joint 'j' mimics another"),
         (
-            turning(inside='<origin xyz="0 0 0" rpy="0 -90 0"/>'),
-            "origin rpy of joint 'j' is -90, which looks like degrees in a radian field",
+            turning(inside='<origin rpy="0 -90 0"/>'),
+            "origin rpy of joint 'j' is -90, which looks like",
         ),
         (urdf(('j', 'revolute', 'a', 'z', '')), "joint 'j' names a link 'z' that is not there"),
-        (
-            urdf(('j', 'revolute', 'a', 'b', ''), ('k', 'revolute', 'c', 'b', '')),
-            "link 'b' hangs on two joints",
-        ),
-        (
-            urdf(('j', 'revolute', 'b', 'c', ''), ('k', 'revolute', 'c', 'b', '')),
-            'no chain of joints',
-        ),
+        (two('a', 'b', 'c', 'b'), "link 'b' hangs on two joints"),
+        (two('b', 'c', 'c', 'b'), 'no chain of joints'),
         (turning(inside='<origin xyz="1 2"/>'), "URDF '"),
         (
             turning(inside='<origin xyz="1 2 nan"/>'),
-            "origin xyz of joint 'j' has 1 value(s) that are not finite",
+            "origin xyz of joint 'j' has 1 value(s) that are",
         ),
     ],
 )
@@ -307,8 +306,8 @@ def test_effects_round_trip(tmp_path, robot):
     ('text', 'words'),
     [
         (
-            '- {effect: backlash, joint: wrist, width: 1e-4}\n',
-            "effect 0: robot 'two' has no joint 'wrist'; its joints are shoulder, elbow",
+            '- {effect: backlash, joint: wrist}\n',
+            "effect 0: robot 'two' has no joint 'wrist'; its",
         ),
         ('- {effect: slack}\n', "effect 0: unknown effect 'slack'"),
         ('effect: backlash\n', 'an effects file must be a list of effects'),

@@ -20,6 +20,7 @@ from weld_twin_nodes.live.settings import MODULES, node_class
 
 PACKAGE = Path(__file__).parents[2]
 LAUNCH = ('cell', 'demo')
+TWIN, INJECTOR = 'forward_kinematics_twin', 'error_injector'
 
 
 AS_FOUND = dict(os.environ)
@@ -38,7 +39,7 @@ def started(name, *words):
 
 def test_nodes_load_nothing_that_they_need_for_a_diagnosis_alone():
     slow = "[m for m in ('scipy.linalg', 'matplotlib', 'weld_twin_core.diagnosis.soundness.gate')"
-    nodes = f'{MODULES["error_injector"]}, {MODULES["live_diagnosis"]}'
+    nodes = f'{MODULES[INJECTOR]}, {MODULES["live_diagnosis"]}'
     code = f'import sys, {nodes}\nprint({slow} if m in sys.modules])'
     said = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
     assert said.stdout == '[]\n'
@@ -47,31 +48,15 @@ def test_nodes_load_nothing_that_they_need_for_a_diagnosis_alone():
 @pytest.mark.parametrize(
     ('name', 'word', 'sentence'),
     [
-        (
-            'forward_kinematics_twin',
-            'rbot:=ur5',
-            "weld_twin: no parameter is called 'rbot'; did you mean 'robot'?\n",
-        ),
-        (
-            'error_injector',
-            'effects:=[{effect: backlash, joint: elbow_joint, width: 5e-4}]',
-            'in two kinds of quotes',
-        ),
-        (
-            'forward_kinematics_twin',
-            'base_from_tf:=true',
-            'needs the names measuring_frame and base_frame\n',
-        ),
-        ('error_injector', 'robot:=ur99', "'ur99' is neither"),
-        ('error_injector', 'seed:=1.5', 'seed'),
+        (TWIN, 'rbot:=ur5', "weld_twin: no parameter is called 'rbot'; did you mean 'robot'?\n"),
+        (TWIN, 'base_from_tf:=true', 'needs the names measuring_frame and base_frame\n'),
+        (INJECTOR, 'effects:=[{effect: time_delay, delay: 5e-4}]', 'in two kinds of quotes'),
+        (INJECTOR, 'robot:=ur99', "'ur99' is neither"),
+        (INJECTOR, 'seed:=1.5', 'seed'),
         ('trajectory_generator', 'path:=nowhere.yaml', "'nowhere.yaml'"),
         ('trajectory_generator', 'rate:=-5.0', 'rate'),
         ('recorder', 'storage:=mcap', "needs the parameter 'out'"),
-        (
-            'contact_marker',
-            'executor:=threads',
-            "executor must be one of events, single_threaded, got 'threads'",
-        ),
+        ('contact_marker', 'executor:=threads', 'must be one of events, single_threaded, got'),
     ],
 )
 def test_a_parameter_that_cannot_be_is_refused_in_a_sentence(name, word, sentence, capsys):
@@ -88,7 +73,7 @@ def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
     for place in ('/nowhere', '/empty'):
         words = ['--ros-args', '--enclave', place]
         result = subprocess.run(
-            [sys.executable, '-m', MODULES['forward_kinematics_twin'], *words],
+            [sys.executable, '-m', MODULES[TWIN], *words],
             capture_output=True,
             text=True,
             timeout=60,
@@ -103,7 +88,7 @@ def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
 def test_a_base_that_is_to_come_from_tf_needs_its_messages():
     frames = ('measuring_frame:=world', 'base_frame:=base_link', 'base_from_tf:=true')
     words = [word for frame in frames for word in ('-p', frame)]
-    result = started('forward_kinematics_twin', '--ros-args', *words)
+    result = started(TWIN, '--ros-args', *words)
     assert result.returncode == 2
     assert 'base_from_tf cannot be done: /tf is not listened to: ' in result.stderr
     assert 'install the package tf2_msgs' in result.stderr

@@ -9,11 +9,9 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
-from datetime import datetime, timezone
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_line import done, refused
 
@@ -55,23 +53,10 @@ def correct(program, out, *more, run=done):
     return run('correct', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
 
 
-def kept_history(path):
-    """Make a history that holds one diagnosis."""
-    from weld_twin_report.history import Database, Entry
-
-    at = datetime(2026, 3, 2, 8, 30, tzinfo=timezone.utc)
-    one = np.ones(1)
-    values = (('joint_offset elbow_joint 0',), 1e-4 * one, 1e-3 * one, 1e-10 * np.eye(1))
-    database = Database(str(path))
-    head = (at, 'ur5', 'abc', '0' * 64, 'identified', 0.9, 1e-4, 1e-5, 1e-5)
-    database.add('line 3', Entry(*head, [], *values, np.eye(4)))
-    database.close()
-    return path
-
-
-def test_a_web_site_is_not_taken_for_pages_of_a_fleet(tmp_path):
+def test_a_web_site_is_not_taken_for_pages_of_a_fleet(tmp_path, elbow_found):
     pytest.importorskip('sqlalchemy', reason='the history is an extra')
-    site, history = tmp_path / 'site', kept_history(tmp_path / 'fleet.db')
+    site, history = tmp_path / 'site', tmp_path / 'fleet.db'
+    done('history', 'add', elbow_found, '--cell', 'a', '--at', '2026-03-02', '--db', history)
     site.mkdir()
     (site / 'index.html').write_text('<h1>Welders of Ghent</h1>')
     (site / 'style.css').write_text('h1 {}')

@@ -41,7 +41,43 @@ def lines(*parts):
     )
 
 
+def many(*names):
+    """Return headers of six columns each, numbered where a brace stands."""
+    return [name.format(k) for name in names for k in range(1, 7)]
+
+
 TABLES = {
+    'German of a spreadsheet': lines(
+        'sep=;',
+        ';'.join([*many('Achse {} [°]'), *(f'Ist {a} [mm]' for a in XYZ)]),
+        rows(DEG, MM, sep=';', comma=True),
+    ),
+    'wanted and measured': lines(
+        ';'.join([*many('A{}'), *(f'{a} {w} (mm)' for w in ('Soll', 'Ist') for a in XYZ)]),
+        rows(DEG, MM + 3.0, MM, sep=';', comma=True),
+    ),
+    'RAPID': lines(
+        '\t'.join([*many('rax_{}'), *(f'trans_{a}' for a in 'xyz')]), rows(DEG, MM, sep='\t')
+    ),
+    'units below, rows numbered': lines(
+        ','.join(['Nr', *J, 'x', 'y', 'z']),
+        ','.join(['', *['deg'] * 6, *['mm'] * 3]),
+        [f'{k},{row}' for k, row in enumerate(rows(DEG, MM), 1)],
+    ),
+    'a title above': lines(
+        'Messprotokoll Zelle 7\nDatum;22.11.2026\n',
+        ';'.join([*many('Gelenk {}'), *(f'Messwert {a}' for a in XYZ)]),
+        rows(DEG, MM, sep=';', comma=True),
+    ),
+    'comments': lines(
+        '// made by hand', '# q0,q1,q2,q3,q4,q5,x,y,z', '% rad and m', rows(Q, SEEN)
+    ),
+    'recorder': lines(
+        ','.join([*many('target_q_{}', 'actual_q_{}', 'actual_qd_{}'), 'tracker_x', 'tracker_y'])
+        + ',tracker_z',
+        rows(0.0 * Q, Q, Q, SEEN),
+    ),
+    'Yaskawa': lines(','.join([*'SLURBT', *(f'{a} mm' for a in XYZ)]), rows(DEG, MM)),
     'two lines of names': lines('Joints,,,,,,Position,,', ','.join([*J, *XYZ]), rows(DEG, MM)),
     'names, units': lines(
         'Joints [deg],,,,,,Measured [mm],,', ','.join([*J, *XYZ]), rows(DEG, MM)
@@ -80,6 +116,7 @@ TABLES = {
         ','.join([*J, *(f'{a}_t [mm]' for a in 'xyz'), *(f'{a}_dif [um]' for a in 'xyz')]),
         rows(DEG, MM - 0.25, np.full((12, 3), 250.0)),
     ),
+    'a real minus': lines(PLAIN, rows(DEG, MM)).replace('-', '\N{MINUS SIGN}'),
     'blanks between': lines('   '.join([*J, *XYZ]), rows(DEG, MM, sep='  ')),
     'inches': lines(','.join([*J, *(f'{a} [in]' for a in XYZ)]), rows(DEG, MM / 25.4)),
     'names over two lines in one cell': lines(
@@ -112,6 +149,19 @@ def test_units_and_columns_are_those_of_the_header(tmp_path, name):
     recording, said = of(tmp_path, TABLES[name])
     np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6, err_msg=str(said))
     np.testing.assert_allclose(recording.measured.position, SEEN, atol=2e-6, err_msg=str(said))
+    computed = 'trans_x may be what the controller computes' in ' '.join(said)
+    assert computed is (name == 'RAPID')
+
+
+def test_positions_that_were_computed_are_told(tmp_path):
+    exact = lines(PLAIN, rows(DEG, 1e3 * forward(ARM, Q)[:, :3, 3]))
+    assert 'these positions were computed, not measured' in ' '.join(of(tmp_path, exact)[1])
+
+
+@pytest.mark.parametrize('coding', ['utf-8-sig', 'cp1252', 'utf-16'])
+def test_a_table_is_read_in_the_coding_it_is_written_in(tmp_path, coding):
+    recording, _ = of(tmp_path, TABLES['German of a spreadsheet'].encode(coding))
+    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)
 
 
 WHOLE = 1e3 * forward(ARM, np.radians(DEG.round()))[:, :3, 3] + 700.0
@@ -176,12 +226,6 @@ def test_a_single_point_at_the_origin_of_the_instrument_is_kept(tmp_path):
 def test_a_pin_at_the_origin_is_touched_again_and_again(tmp_path):
     recording, said = of(tmp_path, lines(PLAIN, rows(DEG, 0.0 * MM)))
     assert not recording.measured.position.any() and len(recording.joints.q) == len(Q), said
-
-
-def test_unicode_text_of_excel_and_a_real_minus_are_read(tmp_path):
-    text = lines(PLAIN, rows(DEG, MM)).replace('-', '\N{MINUS SIGN}')
-    recording, _ = of(tmp_path, text.encode('utf-16'))
-    np.testing.assert_allclose(recording.joints.q, Q, atol=2e-6)
 
 
 @pytest.mark.parametrize('scale', [0.03, 1.0])

@@ -27,36 +27,18 @@ ELSE = {'effect': 'backlash', 'joint': 'wrist_1_joint'}
 
 
 def stations(count=12, sigma=36.0, cost=3.0):
-    return {
-        'kind': 'stations',
-        'sentence': f'Measure {count} stations at rest.',
-        'reason': 'They would part.',
-        'cost': cost,
-        'robot_minutes': cost,
-        'stations': count,
-        'expected_separation_sigma': sigma,
-        'between': [[SPRING], [ZERO]],
-        'motion': {
-            'static': True,
-            'joint_names': ['a'],
-            't': [15.0 * k for k in range(count)],
-            'q': [[0.01 * k] for k in range(count)],
-        },
-    }
+    t, q = [15.0 * k for k in range(count)], [[0.01 * k] for k in range(count)]
+    told = {'sentence': f'Measure {count} stations at rest.', 'reason': 'They would part.'}
+    told |= {'kind': 'stations', 'cost': cost, 'robot_minutes': cost, 'stations': count}
+    told |= {'expected_separation_sigma': sigma, 'between': [[SPRING], [ZERO]]}
+    return {**told, 'motion': {'static': True, 'joint_names': ['a'], 't': t, 'q': q}}
 
 
 def found(status='ambiguous', wanted=None, groups=((SPRING, ZERO),), confidence=0.95):
-    verdict = {
-        'status': status,
-        'confidence': confidence,
-        'effects': [SPRING],
-        'indistinguishable': [list(group) for group in groups],
-    }
-    return {
-        'verdict': verdict,
-        'candidates': [{**SPRING, 'probability': 0.6}],
-        'next_experiment': wanted,
-    }
+    verdict = {'status': status, 'confidence': confidence, 'effects': [SPRING]}
+    verdict['indistinguishable'] = [list(group) for group in groups]
+    candidates = [{**SPRING, 'probability': 0.6}]
+    return {'verdict': verdict, 'candidates': candidates, 'next_experiment': wanted}
 
 
 def test_what_it_says_before_it_is_made_is_kept():
@@ -114,11 +96,8 @@ def at(place, on):
 
 
 def without_name(place, on, probability=0.9):
-    cause = {
-        'place': [{'at': place, 'probability': probability}],
-        'dependence': [{'on': on, 'probability': probability}],
-        'share': 0.8,
-    }
+    cause = {'place': [{'at': place, 'probability': probability}], 'share': 0.8}
+    cause['dependence'] = [{'on': on, 'probability': probability}]
     content = found('unknown', groups=())
     return {**content, 'verdict': {**content['verdict'], 'causes': [cause]}}
 
@@ -182,6 +161,9 @@ def test_the_state_survives_and_a_recording_that_changed_is_refused(tmp_path, ke
         recordings(state)
 
 
+OF_OTHERS = {**stations(), 'between': [[SPRING], [ELSE]]}
+
+
 def named(cause, confidence, status='identified', wanted=None):
     groups = ((cause,),) if cause else ()
     return found(status, wanted, groups, confidence)
@@ -206,12 +188,7 @@ def named(cause, confidence, status='identified', wanted=None):
         (found(groups=((SPRING, ZERO), (ELSE,))), named(SPRING, 0.6), 0, False),
         # Some motion parts what is named beside each other; or none does, and only others are asked.
         (found(wanted=stations()), found(wanted=stations()), 0, False),
-        (
-            found(wanted={**stations(), 'between': [[SPRING], [ELSE]]}),
-            found(wanted={**stations(), 'between': [[SPRING], [ELSE]]}),
-            0,
-            True,
-        ),
+        (found(wanted=OF_OTHERS), found(wanted=OF_OTHERS), 0, True),
         (found(wanted=stations(sigma=0.5)), found(wanted=stations(sigma=0.5)), 0, True),
         (found(), found(), 0, False),
         # What was knocked between two recordings is sound in each.

@@ -5,10 +5,12 @@
 import pytest
 from diagnosis_cells import effect, tiny
 
+from weld_twin_core.diagnosis.algebra.workspace import Part
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Alternative
 from weld_twin_core.diagnosis.hypotheses import search
 from weld_twin_core.diagnosis.hypotheses.alternatives import fit_alternatives
+from weld_twin_core.diagnosis.hypotheses.other_sets import Other
 from weld_twin_core.diagnosis.result import Site
 
 TRUE = (
@@ -52,6 +54,19 @@ def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(
     fit_alternatives(work, now, 0)
     assert starts
     assert all(start.found[0].number('da') == beside.number('da') for start in starts)
+
+
+def test_what_other_waves_of_a_joint_do_without_has_them_as_an_alternative():
+    ratio = effect('gear_ratio', joint='elbow_joint', scale=2e-4)
+    third, others = (
+        effect('transmission_ripple', joint='elbow_joint', amplitude=a, order=o, phase=0.1)
+        for a, o in ((2e-4, 3), ([2e-4, 1e-4], [2, 4]))
+    )
+    problem, model = tiny((ratio, third))
+    work, now = search.workspace(problem, model.with_found((ratio, third)), (), Beliefs())
+    instead = Other(Part(Site.of(ratio)), work.fitted(model.with_found((others,))), -0.5)
+    sites = [one.site for one in fit_alternatives(work, now, 0, [instead])[:2]]
+    assert sites == [Site.of(ratio), Site.of(others)]
 
 
 def test_what_stands_for_several_gives_way_to_them():

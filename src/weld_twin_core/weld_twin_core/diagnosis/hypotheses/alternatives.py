@@ -20,7 +20,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
-from ..algebra.workspace import Choice, Part, Role, Workspace, lead
+from ..algebra.workspace import Choice, Part, Role, Workspace, lead, parts
 from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
@@ -61,14 +61,18 @@ def fit_alternatives(
     for choice, other in tried:
         unit = choice.unit
         out.append(Alternative(unit.site, log_bayes(other, choice), other, role=unit.role))
-    for other_set in others:
-        if other_set.instead_of == Part(place):
-            # What it has that was not found, what entered first before the others.
-            known = {*sites(now), *(one.site for one in out)}
-            first = next((site for site in sites(other_set.fit) if site not in known), None)
-            if first is not None:
-                out.append(Alternative(first, out[0].log_bayes + other_set.ahead, other_set.fit))
+    for instead in (one for one in others if one.instead_of == Part(place)):
+        # What it has that was not found, what entered first before the others; it may be
+        # another wave of a joint that has one.
+        known = {*_parts(now), *(Part(one.site) for one in out)}
+        first = next((part for part in _parts(instead.fit) if part not in known), None)
+        if first is not None:
+            out.append(Alternative(first.site, out[0].log_bayes + instead.ahead, instead.fit))
     return _weighed(out, work.beliefs.temperature)
+
+
+def _parts(result: Fit) -> list[Part]:
+    return [part for effect in result.model.found for part in parts(effect)]
 
 
 def _near(

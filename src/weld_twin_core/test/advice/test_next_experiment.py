@@ -33,9 +33,10 @@ def at_hand(robot, kind=stations, align=('base', 'tool'), **options):
     return asked(robot, recorded(robot, kind(robot, rng, **options), rng), align=align)
 
 
-def proposed(robot, problem, model, *alternatives):
+def proposed(robot, problem, model, *alternatives, **limits):
     made = [effects_from_list([entry], robot) for entry in alternatives]
-    return next_experiment(problem, model, made, known_scale(problem))
+    more = (Limits(**limits),) if limits else ()
+    return next_experiment(problem, model, made, known_scale(problem), *more)
 
 
 SPRING = {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 1e-5}
@@ -124,9 +125,7 @@ def test_what_comes_with_time_is_foreseen_for_the_stations_as_they_are_run(ur5):
     wear = {'effect': 'wear', 'rate': 4e-7}
     drift = {'effect': 'drift', 'xyz_rate': [0.0, 0.0, 1e-8]}
     problem, model = at_hand(ur5, align=())
-    made = [effects_from_list([entry], ur5) for entry in (wear, drift)]
-    limits = Limits(minutes=5.0, set_up=False)
-    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    found = proposed(ur5, problem, model, wear, drift, minutes=5.0, set_up=False)
     # Stations of another place in the row would be foreseen with the time of that place.
     assert found['motion']['static'] and found['stations'] > 5
     parted = left_by_the_wrong_one(ur5, *with_motion(ur5, found), wear, drift)
@@ -195,29 +194,24 @@ def test_motions_are_plain_numbers_within_the_limits_of_the_robot(name):
 def test_minutes_and_a_box_are_kept(ur5):
     problem, model = at_hand(ur5)
     low, high = np.array([-0.6, -0.9, 0.05]), np.array([0.9, 0.9, 1.1])
-    limits = Limits(minutes=2.0, set_up=False, box=np.array([low, high]))
-    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
-    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    limits = {'minutes': 2.0, 'set_up': False, 'box': np.array([low, high])}
+    found = proposed(ur5, problem, model, SPRING, OFFSET, **limits)
     assert found['robot_minutes'] <= 2.0 and found['cost'] == found['robot_minutes']
     tips = wt.forward(ur5, np.array(found['motion']['q']))[:, :3, 3]
     assert ((tips > low) & (tips < high)).all()
 
 
 def test_what_is_set_up_counts_among_the_minutes(ur5):
-    problem, model = at_hand(ur5)
-    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
     for minutes in (4.0, 22.0):
-        limits = Limits(minutes=minutes)
-        found = next_experiment(problem, model, made, known_scale(problem), limits)
+        found = proposed(ur5, *at_hand(ur5), SPRING, OFFSET, minutes=minutes)
         assert found['robot_minutes'] <= found['cost'] <= minutes
 
 
 def test_the_way_from_station_to_station_is_free_too(ur5):
     problem, model = at_hand(ur5)
     box = np.array([[-0.7, -0.9, 0.02], [0.9, 0.9, 1.1]])
-    limits = Limits(minutes=5.0, set_up=False, box=box)
-    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
-    found = next_experiment(problem, model, made, known_scale(problem), limits)
+    limits = {'minutes': 5.0, 'set_up': False, 'box': box}
+    found = proposed(ur5, problem, model, SPRING, OFFSET, **limits)
     q = np.array(found['motion']['q'])
     assert found['motion']['static'] and len(q) == found['stations']
     share = np.linspace(0.0, 1.0, 9)[:, None]
@@ -246,14 +240,12 @@ def test_a_seam_that_was_recorded_may_be_run_backward_and_slower(ur5):
 
 def test_a_longer_experiment_says_no_less(ur5):
     problem, model = at_hand(ur5, size=0.05)
-    made = [effects_from_list([entry], ur5) for entry in (SPRING, OFFSET)]
     told = [
-        next_experiment(
-            problem, model, made, known_scale(problem), Limits(minutes=m, set_up=False)
-        )['expected_separation_sigma']
-        for m in (0.5, 1.0, 4.0)
+        proposed(ur5, problem, model, SPRING, OFFSET, minutes=minutes, set_up=False)
+        for minutes in (0.5, 1.0, 4.0)
     ]
-    assert told == sorted(told)
+    sigmas = [found['expected_separation_sigma'] for found in told]
+    assert sigmas == sorted(sigmas)
 
 
 def test_nothing_is_asked_without_minutes():
@@ -265,9 +257,9 @@ def test_nothing_is_asked_without_minutes():
 
 def test_a_box_without_room_for_the_arm_is_told(ur5):
     problem, model = at_hand(ur5)
-    far = Limits(box=np.array([[5.0, 5.0, 0.0], [6.0, 6.0, 1.0]]))
+    far = np.array([[5.0, 5.0, 0.0], [6.0, 6.0, 1.0]])
     with pytest.raises(DataError, match='holds no posture near those recorded'):
-        next_experiment(problem, model, [()], known_scale(problem), far)
+        proposed(ur5, problem, model, SPRING, box=far)
 
 
 def test_of_causes_that_fit_alike_the_next_measurement_parts_two(ur5):

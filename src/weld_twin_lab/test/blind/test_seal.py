@@ -91,17 +91,8 @@ def test_a_list_sealed_anew_does_not_pass_for_the_one_published(sealed):
 
 def test_the_command_line_tells_of_a_broken_seal_in_one_line(sealed, tmp_path):
     change(sealed[1] / 'case_0001' / seal.TRUTH)
-    result = refused(
-        'blind',
-        'score',
-        sealed[0],
-        '--truths',
-        sealed[1],
-        '--results',
-        tmp_path / 'verdicts',
-        '--out',
-        tmp_path / 'score',
-    )
+    words = ('--truths', sealed[1], '--results', tmp_path / 'verdicts')
+    result = refused('blind', 'score', sealed[0], *words, '--out', tmp_path / 'score')
     assert 'truth of case_0001 was changed' in result
     assert not (tmp_path / 'score').exists()
 

@@ -72,19 +72,6 @@ def test_a_slow_thermometer():
     assert got.temperature[-1] == pytest.approx(20.0 + 0.1 * late, abs=0.05)
 
 
-def test_same_seed_same_recording():
-    command = weave(UR5, 3.0)
-    tracker = Tracker(rate=60.0, sigma=1e-5, jitter=1e-3, drop=0.1)
-    effects = [
-        {'effect': 'backlash', 'joint': 'j2', 'width': 5e-4},
-        {'effect': 'friction_wander', 'joint': 'j1', 'amplitude': 1e-4, 'time_constant': 1.0},
-    ]
-    one, two, other = (record(UR5, effects, command, tracker, seed) for seed in (7, 7, 8))
-    assert np.array_equal(one.position, two.position)
-    assert np.array_equal(one.t_measured, two.t_measured)
-    assert one.position.shape != other.position.shape or (one.position != other.position).any()
-
-
 @pytest.mark.parametrize(
     't, q, match',
     [

@@ -86,13 +86,6 @@ def test_halves_share_nothing(found):
     assert not stamps(odd) & stamps(even) and len(stamps(odd)) == len(stamps(even)) == 120
 
 
-def test_few_stations_are_all_fitted_on():
-    fitted, back = kept_back(np.arange(LEAST))
-    assert fitted.size == LEAST and back.size == 0
-    fitted, back = kept_back(np.arange(18))
-    assert fitted.size == LEAST and back.size == 3
-
-
 def test_the_interval_of_a_ratio_holds_it_and_knows_pairs():
     rng = np.random.default_rng(0)
     other = rng.uniform(0.1, 1.0, 400)

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`import`: tables made here from known angles, in the units and words of others."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from command_line import done, refused
@@ -35,6 +38,24 @@ def test_degrees_and_millimetres_arrive_as_radians_and_metres(tmp_path, table):
     np.testing.assert_allclose(recording.measured.position, position, rtol=0.0, atol=1e-13)
     assert 'joint angles are in degrees' in result
     assert 'base and tool frame not fitted: RMS 2.000 mm, max 2.000 mm' in result
+
+
+def test_a_table_that_memory_has_no_room_for_is_one_sentence_and_leaves_nothing(tmp_path, table):
+    file, bag = table[0], tmp_path / 'bag'
+    with file.open('a') as more:
+        more.writelines([file.read_text().splitlines()[1] + '\n'] * 1_000_000)
+    program = (
+        'import resource, sys\n'
+        'resource.setrlimit(resource.RLIMIT_AS, (1_000_000_000,) * 2)\n'
+        'from weld_twin_nodes.cli.main import main\n'
+        'sys.exit(main())\n'
+    )
+    words = ('import', file, '--robot', 'ur5', '--out', bag)
+    command = [sys.executable, '-c', program, *map(str, words)]
+    run = subprocess.run(command, capture_output=True, text=True)
+    said = 'weld-twin: there is too little memory for this; free some, or give less at once\n'
+    assert (run.returncode, run.stderr) == (2, said)
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_a_list_of_numbers_may_begin_with_a_sign(tmp_path, table):

@@ -86,6 +86,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (TwinError, OSError) as error:  # what the user can do something about
         print(f'weld-twin: {_one_line(error)}', file=sys.stderr)
         return USAGE_ERROR
+    except MemoryError:
+        if argv is not None:  # whoever called it says what it was allowed
+            raise
+        said = 'there is too little memory for this; free some, or give less at once'
+        print(f'weld-twin: {said}', file=sys.stderr)
+        return USAGE_ERROR
 
 
 def _end(*_: object) -> None:

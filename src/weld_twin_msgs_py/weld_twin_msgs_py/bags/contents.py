@@ -20,6 +20,7 @@ from weld_twin_core.errors import DataError, TwinError
 from ..assembly.foreign_types import plain_messages, split_topic
 from ..messages.topics import BY_NAME, CONTACT, TopicNames
 from .from_bag import read_recording
+from .images import READ
 from .needed import GAP, TYPES, Ends, never_recorded, no_joints, no_measurements, uneven_ends
 from .reader import BagReader
 
@@ -174,6 +175,7 @@ def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
     """Return use and acceptable types by topic name; joints last, for one topic may tell both."""
     return {
         names.contact: ('contact', (CONTACT.type,)),
+        names.images: ('images', tuple(READ)),
         **{split_topic(getattr(names, r.value))[0]: (r.value, t) for r, t in TYPES.items()},
     }
 
@@ -219,7 +221,8 @@ def _judge(
     joints = used.get('joints')
     if joints is None:
         missing.append(no_joints(names, present))
-    measured = used.get('contact') or used.get('pose') or used.get('point')
+    told = ('contact', 'images', 'pose', 'point')
+    measured = next((used[use] for use in told if use in used), None)
     if measured is None and joints and joints.name == split_topic(names.pose)[0]:
         measured = joints  # a controller tells of both: what it commands and what comes back
     if measured is None:

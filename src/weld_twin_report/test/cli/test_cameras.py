@@ -12,6 +12,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from command_line import done
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.effects import REGISTRY
@@ -202,6 +203,7 @@ def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path):
     robot, bag = cell(tmp_path, zeros=np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])), tmp_path / 'bag'
     words = ('import', tmp_path / 'pixels.csv', '--robot', robot, *described(tmp_path))
     said = weld_twin(*words, '--out', bag).out
+    assert done('bag', bag).endswith('\nusable for a diagnosis\n')
     words = ('--robot', robot, '--align', 'base,tool', *OTHERS)
     found = found_in(tmp_path / 'out', bag, *words)
     assert '40 of 40 images tell a pose; points are found within 0.1' in said

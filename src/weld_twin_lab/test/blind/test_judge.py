@@ -11,6 +11,7 @@ from weld_twin_lab.blind.scoring import (
     bootstrap,
     brier,
     calibration_error,
+    calibration_error_by_chance,
     judge,
     measures,
     page,
@@ -205,5 +206,7 @@ def test_calibration_error_by_hand():
 def test_a_calibrated_confidence_has_little_error():
     rng = np.random.default_rng(2)
     sure = rng.uniform(size=2000)
-    assert calibration_error(sure, rng.uniform(size=2000) < sure).value < 0.04
+    error = calibration_error(sure, rng.uniform(size=2000) < sure).value
+    assert error == pytest.approx(calibration_error_by_chance(sure), abs=0.015)
+    assert error < 0.04
     assert calibration_error(sure, rng.uniform(size=2000) < 0.5 * sure).value > 0.2

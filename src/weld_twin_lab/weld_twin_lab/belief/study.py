@@ -24,6 +24,7 @@ from ..blind.scoring import (
     bootstrap,
     brier,
     calibration_error,
+    calibration_error_by_chance,
     measure_table,
     measured,
     share,
@@ -240,6 +241,7 @@ def worth(examples: Sequence[Example]) -> dict[str, Any]:
         'right': int(right.sum()),
         'log_loss': log_loss(reported, right, np.ones(right.size)),
         'ece': calibration_error(list(reported), list(map(bool, right)))._asdict(),
+        'ece_by_chance': calibration_error_by_chance(list(reported)),
         'brier': brier(list(reported), list(map(bool, right)))._asdict(),
         'sure': share(sure)._asdict(),
         'sure_and_wrong': wrong,
@@ -264,6 +266,8 @@ def page(result: Mapping[str, Any]) -> str:
             *_bounds(result['learned_from'], result['judged_on']),
             '',
             tabled(STATEMENTS, result['statements'].items()),
+            'By chance: the calibration error that so many statements have where each is exactly right.',
+            '',
             *(_beside_goals(result) if result['goals'] else ()),
         ]
     )
@@ -323,6 +327,7 @@ STATEMENTS: dict[str, Callable[[Any], object]] = {
     'number': lambda row: row[1]['statements'],
     'right': lambda row: _percent(row[1]['right'] / row[1]['statements']),
     'calibration error': lambda row: f'{row[1]["ece"]["value"]:.3f}',
+    'by chance': lambda row: f'{row[1]["ece_by_chance"]:.3f}',
     'log loss': lambda row: f'{row[1]["log_loss"]:.3f}',
     'sure': lambda row: _percent(row[1]['sure']['value']),
     'sure and wrong': lambda row: row[1]['sure_and_wrong'],

@@ -150,6 +150,14 @@ def calibration_error(confidence: Sequence[float], right: Sequence[bool]) -> Est
     return bootstrap(pairs, _calibration_error)
 
 
+def calibration_error_by_chance(confidence: Sequence[float]) -> float:
+    """Return the calibration error that confidences have on average where each is exactly right."""
+    sure = np.asarray(confidence, dtype=float)
+    right = np.random.default_rng(0).random((DRAWS, sure.size)) < sure
+    pairs = np.stack([np.broadcast_to(sure, right.shape), right], axis=-1)
+    return float(_calibration_error(pairs, axis=1).mean())
+
+
 def _calibration_error(pairs: Array, axis: int) -> Array:
     """Return the error of every resample; pairs (..., N, 2), ``axis`` that of the cases."""
     sure, true = pairs[..., 0], pairs[..., 1]

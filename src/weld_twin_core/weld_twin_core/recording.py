@@ -288,6 +288,10 @@ class Counted(NamedTuple):
         Raises DataError: they are of another number of joints, or no numbers.
         """
         shapes = {'matrix': (n, n), 'offset': (n,)}
+        if not (isinstance(entry, Mapping) and entry.keys() >= shapes.keys()):
+            raise DataError(
+                "how joints are counted is told by 'matrix' and 'offset'; both are needed"
+            )
         return cls(*(readonly(entry[key], shape, key) for key, shape in shapes.items()))
 
 

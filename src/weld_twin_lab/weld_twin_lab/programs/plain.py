@@ -24,6 +24,7 @@ from weld_twin_core.arm.robot import Robot
 
 Lengths = np.ndarray | float
 STILL = np.eye(4)
+"""Pose of what has neither moved nor turned."""
 CLOSED, REACHED = 1e-11, 1e-7
 """Gap [m, rad] at which there is no further round, and up to which a pose counts as reached."""
 ROUNDS = 50

@@ -351,6 +351,7 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
         (lambda d: d['verdict'].update(causes=[7]), 'the model of diagnosis'),
         (lambda d: d['model']['alone'].update(whole_recorded_m=None), 'the model of diagnosis'),
         (lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs was changed'),
+        (lambda d: d['model'].update(counted=[]), 'how joints are counted is told by'),
         (lambda d: d.update(shrink=None), 'shrink of the diagnosis means nothing'),
         (lambda d: d['gap'].pop('noise_floor_m'), 'shrink of the diagnosis means nothing'),
     ],

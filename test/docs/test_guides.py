@@ -56,7 +56,7 @@ def test_every_option_is_told(capsys):
         assert option in GUIDE, option
 
 
-DOCS = Path(__file__).parents[2] / 'docs'
+DOCS = ROOT / 'docs'
 PAGES = ('ur', 'kuka', 'abb', 'fanuc', 'yaskawa')
 DIAGNOSED = 'fanuc'
 """Of whose arm the table is diagnosed: the one that counts its third axis otherwise."""
@@ -68,12 +68,8 @@ TURNED = 2.5e-3
 
 def commands(page):
     text = (DOCS / f'first_{page}.md').read_text(encoding='utf-8')
-    return [
-        line
-        for block in re.findall(r'```bash\n(.*?)```', text, re.S)
-        for line in block.split('\n')
-        if line
-    ]
+    blocks = re.findall(r'```bash\n(.*?)```', text, re.S)
+    return [line for block in blocks for line in block.splitlines() if line]
 
 
 def measure(table, robot, third_from_ground):

@@ -17,9 +17,8 @@ import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-import rclpy
-from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, TransformStamped
-from rclpy.node import Node
+from geometry_msgs.msg import PoseStamped
+from participants import participant, placed
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
@@ -27,6 +26,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
@@ -181,13 +181,8 @@ def node(cell):
 
 @pytest.fixture(scope='module')
 def driver_node(cell):
-    """The node of all drivers, in a participant of its own."""
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=cell.domain)
-    node = Node('driver', context=context)
-    yield node
-    node.destroy_node()
-    context.try_shutdown()
+    with participant('driver', cell.domain) as node:
+        yield node
 
 
 @pytest.mark.parametrize('which', DRIVERS)
@@ -225,43 +220,33 @@ def off(T):
     return out
 
 
-def fill(pose, T):
-    from scipy.spatial.transform import Rotation
-
-    at, turn = Rotation.from_matrix(T[:3, :3]).as_quat(), getattr(pose, 'orientation', None)
-    turn = pose.rotation if turn is None else turn
-    where = getattr(pose, 'position', None) or pose.translation
-    where.x, where.y, where.z = T[:3, 3].tolist()
-    turn.x, turn.y, turn.z, turn.w = at.tolist()
-    return pose
-
-
 def rigid_bodies(T, header):
     """Return what vicon, optitrack and qualisys drivers of MOCAP4ROS2 send, the tool second."""
     from mocap4r2_msgs.msg import RigidBodies, RigidBody
 
-    other, tool = RigidBody(rigid_body_name='table'), RigidBody(rigid_body_name='torch')
+    other = RigidBody(rigid_body_name='table')
     other.pose.orientation.w = 1.0
-    fill(tool.pose, T)
+    tool = RigidBody(rigid_body_name='torch', pose=pose(T, header).pose)
     return RigidBodies(header=header, rigidbodies=[other, tool])
 
 
 def tag(T, header):
     from tf2_msgs.msg import TFMessage
 
-    seen = TransformStamped(header=header, child_frame_id='36h11:5')
-    fill(seen.transform, T)
-    return TFMessage(transforms=[seen])
+    stamp = header.stamp.sec * S + header.stamp.nanosec
+    return TFMessage(transforms=[placed(T, stamp, header.frame_id, '36h11:5')])
 
 
 def pose(T, header):
-    return PoseStamped(header=header, pose=fill(Pose(), T))
+    out = ros_messages().pose(S, T[:3, 3], T[:3, :3])
+    out.header = header
+    return out
 
 
 def point(T, header):
-    return PointStamped(
-        header=header, point=Point(**dict(zip('xyz', T[:3, 3].tolist(), strict=True)))
-    )
+    out = ros_messages().point(S, T[:3, 3])
+    out.header = header
+    return out
 
 
 INSTRUMENTS = {

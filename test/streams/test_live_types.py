@@ -16,8 +16,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-import rclpy
-from rclpy.node import Node
+from participants import participant, placed
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from scipy.spatial.transform import Rotation
 
@@ -52,13 +51,8 @@ def cell(tmp_path):
 
 @pytest.fixture
 def other(cell):
-    """A node of somebody else, in a participant of its own."""
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=cell.domain)
-    node = Node('other', context=context)
-    yield node
-    node.destroy_node()
-    context.try_shutdown()
+    with participant('other', cell.domain) as node:
+        yield node
 
 
 def kind(name):
@@ -71,17 +65,6 @@ def publisher(cell, other, name, topic, *, latched=False):
     durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
     out = other.create_publisher(kind(name), topic, QoSProfile(depth=10, durability=durability))
     cell.wait(lambda: cell.node.count_publishers(topic) > 0, topic)
-    return out
-
-
-def placed(T, stamp, frame, child):
-    """Return a TransformStamped."""
-    out = kind('geometry_msgs/TransformStamped')()
-    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp, S)
-    out.header.frame_id, out.child_frame_id = frame, child
-    p, q = out.transform.translation, out.transform.rotation
-    p.x, p.y, p.z = T[:3, 3].tolist()
-    q.x, q.y, q.z, q.w = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
     return out
 
 

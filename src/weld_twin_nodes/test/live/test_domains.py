@@ -6,11 +6,10 @@ import os
 import subprocess
 import sys
 import tempfile
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 
 import pytest
-import rclpy
-from rclpy.node import Node
+from participants import participant
 
 from weld_twin_nodes.harness.process import DOMAINS, own_domain
 
@@ -67,23 +66,10 @@ def test_another_process_has_another_domain_which_is_free_again_once_that_is_kil
 def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same_start, elsewhere):
     with ExitStack() as strangers:
         for _ in range(elsewhere):  # a process numbers its participants of all domains in one row
-            strangers.enter_context(_stranger(OTHER))
+            strangers.enter_context(participant('stranger', OTHER))
         with own_domain() as free:
             pass
-        strangers.enter_context(_stranger(free))
+        strangers.enter_context(participant('stranger', free))
         with own_domain() as ours:
             assert ours in DOMAINS
             assert ours != free
-
-
-@contextmanager
-def _stranger(domain):
-    """Have a node speak in a domain without holding its lock."""
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
-    node = Node('stranger', context=context)
-    try:
-        yield
-    finally:
-        node.destroy_node()
-        context.try_shutdown()

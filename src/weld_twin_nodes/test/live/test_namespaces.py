@@ -4,9 +4,8 @@
 
 import numpy as np
 import pytest
-import rclpy
 from geometry_msgs.msg import PoseArray, PoseStamped, Vector3Stamped
-from rclpy.node import Node
+from participants import participant
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
@@ -155,13 +154,8 @@ def test_publishers_are_counted_under_the_remapped_name(cell):
 
 @pytest.fixture
 def tracker(cell):
-    """Give a node of a participant of its own, as every driver is."""
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=cell.domain)
-    node = Node('tracker', namespace='cell', context=context)
-    yield node
-    node.destroy_node()
-    context.try_shutdown()
+    with participant('tracker', cell.domain, 'cell') as node:
+        yield node
 
 
 def test_a_publisher_of_another_type_is_told_of_by_name_and_for_as_long(cell, tracker):

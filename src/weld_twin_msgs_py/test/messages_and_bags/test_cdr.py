@@ -50,41 +50,28 @@ def numbers_of(item):
     return [*map(ord, item.child_frame_id), p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 
 
-SURE = MAKE.pose_with_covariance(NS, np.arange(3.0), TURN, np.diag(np.arange(1.0, 7.0)), 'tracker')
-SAMPLES = {
-    'geometry_msgs/msg/PoseWithCovarianceStamped': (
-        SURE,
-        lambda m: [*from_messages.pose(m)[0], from_messages.position_sigma(m)],
-    ),
-    'geometry_msgs/msg/TransformStamped': (transform('tracker', 'probe'), numbers_of),
-    'tf2_msgs/msg/TFMessage': (
-        TYPES.types['tf2_msgs/msg/TFMessage']([transform('a', 'bc'), transform('abc', 'd')]),
-        lambda m: [n for item in m.transforms for n in numbers_of(item)],
-    ),
-    'geometry_msgs/msg/PoseStamped': (
-        MAKE.pose(NS, np.arange(3.0), TURN, 'tracker'),
-        lambda m: [*from_messages.pose(m)[0], *from_messages.pose(m)[1].flat],
-    ),
-    'geometry_msgs/msg/PointStamped': (MAKE.point(NS, np.arange(3.0), 'a'), from_messages.point),
-    'geometry_msgs/msg/Vector3Stamped': (
-        MAKE.vector3(NS, np.arange(3.0), ''),
-        from_messages.vector3,
-    ),
-    'geometry_msgs/msg/WrenchStamped': (MAKE.wrench(NS, np.arange(6.0)), from_messages.wrench),
-    'sensor_msgs/msg/Temperature': (MAKE.temperature(NS, 21.5, 'arm'), from_messages.temperature),
-    'trajectory_msgs/msg/JointTrajectory': (
+P = np.arange(3.0)
+SURE = MAKE.pose_with_covariance(NS, P, TURN, np.diag(np.arange(1.0, 7.0)), 'tracker')
+FRAMES = TYPES.types['tf2_msgs/msg/TFMessage']([transform('a', 'bc'), transform('abc', 'd')])
+TEXT = TYPES.types['std_msgs/msg/String'](data='<robot name="Schweißer"/>')
+READ = from_messages
+SAMPLES = [
+    (SURE, lambda m: [*READ.pose(m)[0], READ.position_sigma(m)]),
+    (transform('tracker', 'probe'), numbers_of),
+    (FRAMES, lambda m: [n for item in m.transforms for n in numbers_of(item)]),
+    (MAKE.pose(NS, P, TURN, 'tracker'), lambda m: [*READ.pose(m)[0], *READ.pose(m)[1].flat]),
+    (MAKE.point(NS, P, 'a'), READ.point),
+    (MAKE.vector3(NS, P, ''), READ.vector3),
+    (MAKE.wrench(NS, np.arange(6.0)), READ.wrench),
+    (MAKE.temperature(NS, 21.5, 'arm'), READ.temperature),
+    (
         MAKE.joint_trajectory(NS, ('b', 'a'), MOTION),
-        lambda m: from_messages.joint_trajectory(m, ('a', 'b')).q,
+        lambda m: READ.joint_trajectory(m, ('a', 'b')).q,
     ),
-    'nav_msgs/msg/Path': (
-        MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'),
-        from_messages.path_points,
-    ),
-    'std_msgs/msg/String': (
-        TYPES.types['std_msgs/msg/String'](data='<robot name="Schweißer"/>'),
-        lambda m: [ord(c) for c in m.data],
-    ),
-}
+    (MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'), READ.path_points),
+    (TEXT, lambda m: [ord(c) for c in m.data]),
+]
+SAMPLES = {sample[0].__msgtype__: sample for sample in SAMPLES}
 
 
 @pytest.mark.parametrize('kind', READERS)

@@ -50,28 +50,28 @@ def urdf(*fixed, root='base_link', last='link_6', axis='0 0 -1'):
 
 
 TORCH = ('0.1 0 0.3', '0 0.5 0')
+
+
+def to(child, xyz='0.1 0 0', rpy='0 0 0', parent='link_6'):
+    """Return what is fixed to a link, the last one unless told."""
+    return parent, child, xyz, rpy
+
+
 HANDS = {
-    'tool0 of ROS-Industrial': ('tool0', ('link_6', 'tool0', '0.1 0 0', '0 1.5707963 0')),
+    'tool0 of ROS-Industrial': ('tool0', to('tool0', rpy='0 1.5707963 0')),
     'tool0 before flange': (
         'tool0',
-        ('link_6', 'flange', '0.1 0 0', '0 0 0'),
-        ('flange', 'tool0', '0 0 0', '0 1.5707963 0'),
+        to('flange'),
+        to('tool0', '0 0 0', '0 1.5707963 0', 'flange'),
     ),
-    'a tip called tool0': (
-        'flange',
-        ('link_6', 'flange', '0.1 0 0', '0 0 0'),
-        ('flange', 'tool0', '0.05 0 0.3', '0 0.6 0'),
-    ),
-    'flange alone': ('flange', ('link_6', 'flange', '0.1 0 0', '0 0 0')),
-    'a flange of another name': (
-        'mounting_flange',
-        ('link_6', 'mounting_flange', '0.1 0 0', '0 0 0'),
-    ),
-    'one link more than joints': ('link7', ('link_6', 'link7', '0.1 0 0', '0 0 0')),
-    'a flange with a number': ('fr3_link8', ('link_6', 'fr3_link8', '0.1 0 0', '0 0 0')),
-    'an end that carries the tool': ('ee_link', ('link_6', 'ee_link', '0.1 0 0', '0 0 1')),
+    'a tip called tool0': ('flange', to('flange'), to('tool0', '0.05 0 0.3', '0 0.6 0', 'flange')),
+    'flange alone': ('flange', to('flange')),
+    'a flange of another name': ('mounting_flange', to('mounting_flange')),
+    'one link more than joints': ('link7', to('link7')),
+    'a flange with a number': ('fr3_link8', to('fr3_link8')),
+    'an end that carries the tool': ('ee_link', to('ee_link', rpy='0 0 1')),
     'the last link': ('link_6',),
-    'a tool of two parts': ('link_6', ('link_6', 'cable_box', '0 0 0.1', '0 0 0')),
+    'a tool of two parts': ('link_6', to('cable_box', '0 0 0.1')),
 }
 
 

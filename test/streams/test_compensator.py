@@ -432,6 +432,13 @@ def test_goals_go_to_a_controller_that_is_named(controller, sentence, packages, 
     assert sentence in capsys.readouterr().err
 
 
+@pytest.fixture
+def deviation(planner):
+    publisher = planner.cell.publisher(DEVIATION)
+    yield publisher
+    planner.cell.node.destroy_publisher(publisher)
+
+
 def deviate(planner, deviation, size, stamps):
     """Publish deviations of a size at some stamps, and wait until they have come."""
     for stamp in stamps:
@@ -439,8 +446,7 @@ def deviate(planner, deviation, size, stamps):
     planner.cell.meet()
 
 
-def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
-    deviation = planner.cell.publisher(DEVIATION)
+def test_deviations_that_the_model_does_not_leave_withdraw_it(planner, deviation):
     planner.to(HOME + 1.0)  # where nothing was recorded, nothing was promised
     deviate(planner, deviation, 3e-4, range(20))
     planner.to(HOME)
@@ -448,16 +454,16 @@ def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviate(planner, deviation, 3e-4, range(20))
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
-    planner.cell.node.destroy_publisher(deviation)
 
 
-def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(planner):
+def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(
+    planner, deviation
+):
     """A curve over direction says what is lost on the way, and at rest not on which side."""
     lost = {'effect': 'joint_curve', 'joint': NAMES[1], 'over': 'direction', 'knots': [-1.0, 1.0]}
     write_model(planner.model, OFF, {**lost, 'values': [-3e-4, 3e-4]})
     assert planner.cell.trigger('/compensator/reload').success
     seen(planner.cell, 0.5)  # in which the arm stands
-    deviation = planner.cell.publisher(DEVIATION)
     before = planner.process.log.count('does not hold')
     now = planner.cell.node.get_clock().now().nanoseconds
     deviate(planner, deviation, 3e-4, (now - k * 4_000_000 for k in range(40)))
@@ -471,11 +477,9 @@ def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(
     deviate(planner, deviation, 3e-4, fast)
     told = lambda: planner.process.log.count('does not hold') > before  # noqa: E731
     planner.cell.wait(told, 'the notice')
-    planner.cell.node.destroy_publisher(deviation)
 
 
-def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
-    deviation = planner.cell.publisher(DEVIATION)
+def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner, deviation):
     deviate(planner, deviation, 1e-5, range(5))
     for _ in range(20):  # a busy machine takes long for these
         seen(planner.cell, 2.2)
@@ -490,7 +494,6 @@ def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
     assert '19 of the 20 measurements' in early['why']
     assert handle.accepted, line
     planner.result(handle)
-    planner.cell.node.destroy_publisher(deviation)
 
 
 def test_a_controller_that_dies_ends_its_goal(planner):

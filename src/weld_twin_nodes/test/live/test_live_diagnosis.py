@@ -106,15 +106,19 @@ def swinging():
     return motion, exact + np.random.default_rng(3).normal(scale=2e-5, size=exact.shape)
 
 
+def answer(worker):
+    while worker.busy:
+        time.sleep(0.05)
+    return worker.take()
+
+
 def test_a_job_runs_elsewhere_while_the_caller_goes_on():
     motion, seen = swinging()
     recording = Recording('live', motion, Measurements(motion.t, seen), epoch_ns=START)
     worker = Worker()
     worker.start(Job(recording, ONE_JOINT))
     assert worker.busy and worker.take() is None  # the caller is back before the answer
-    while worker.busy:
-        time.sleep(0.05)
-    finding = worker.take()
+    finding = answer(worker)
     assert isinstance(finding, Finding)
     assert finding.stamp == START + 5_980_000_000
     assert finding.status != 'none'
@@ -122,12 +126,15 @@ def test_a_job_runs_elsewhere_while_the_caller_goes_on():
     assert worker.take() is None
 
 
-def test_a_job_that_cannot_be_done_answers_with_a_sentence(recording):
-    worker = Worker()
+def test_a_job_that_cannot_be_done_answers_with_a_sentence_or_what_it_said_at_its_end(recording):
+    said = []
+    worker = Worker(said.append)
     worker.start(Job(recording.with_measured(None), load('ur5')))
-    while worker.busy:
-        time.sleep(0.05)
-    assert 'holds no measured poses' in worker.take()
+    assert 'holds no measured poses' in answer(worker)
+    worker.start(Job('no recording', load('ur5')))
+    assert answer(worker) == 'the diagnosis ended with code 1'
+    (told,) = (line for line in said if line.startswith('the diagnosis says: Traceback'))
+    assert "'str' object has no attribute" in told
 
 
 FOCAL = 900.0
@@ -203,17 +210,6 @@ def test_the_node_hears_what_cameras_see(tmp_path):
             stamp = START + round(t * 1e9)
             where.publish(cell.messages.image_points(stamp, 'eye', rows))
         cell.wait(lambda: len(node._window.images) == 5, 'five images')
-
-
-def test_what_the_other_process_says_of_its_end_is_told():
-    said = []
-    worker = Worker(said.append)
-    worker.start(Job('no recording', load('ur5')))
-    while worker.busy:
-        time.sleep(0.05)
-    assert worker.take() == 'the diagnosis ended with code 1'
-    assert said[0].startswith('the diagnosis says: Traceback')
-    assert "'str' object has no attribute" in said[0]
 
 
 def test_a_job_under_way_can_be_ended(recording):

@@ -143,3 +143,13 @@ def test_damaged_files_are_read_alike(tmp_path, robot, messages, storage, monkey
         damaged[place] ^= 0xFF
         file.write_bytes(damaged)
         assert everything(bag, robot) == one_by_one(bag, robot, monkeypatch)
+
+
+def test_of_a_bag_that_is_only_looked_through_the_last_samples_are_kept_alone():
+    kept, passing = (Stream('/joint_states', 2, kept=keep) for keep in (True, False))
+    for stream in (kept, passing):
+        for k in range(100):
+            stream.extend(np.arange(10 * k, 10 * k + 10), np.full((10, 2), float(k)))
+        stream.append(1000, (7.0, 8.0))
+    assert (len(kept), len(passing)) == (1001, 1)
+    np.testing.assert_array_equal(passing.samples().rows, kept.samples().rows[-1:])

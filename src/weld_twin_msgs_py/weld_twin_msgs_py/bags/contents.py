@@ -19,7 +19,7 @@ from weld_twin_core.errors import DataError, TwinError
 
 from ..assembly.foreign_types import plain_messages, split_topic
 from ..messages.topics import BY_NAME, CONTACT, TopicNames
-from .from_bag import read_recording
+from .from_bag import refuse_unreadable
 from .images import READ
 from .needed import GAP, TYPES, Ends, never_recorded, no_joints, no_measurements, uneven_ends
 from .reader import BagReader
@@ -112,7 +112,7 @@ def _refusal(path: Path | str, names: TopicNames, made: Mapping[str, Any]) -> st
         except (KeyError, TwinError):
             robot = _robot_of(path, split_topic(names.joints))
             names = replace(names, joint_prefix='', joint_map=())
-        read_recording(path, robot, names, needs_measurements=True)
+        refuse_unreadable(path, robot, names)
     except TwinError as error:
         return str(error)
     return ''

@@ -32,7 +32,7 @@ from ..assembly.joint_states import Incomplete, Missing, names_called
 from ..messages.cdr import Layout, layout_of
 from ..messages.from_messages import NANOSECONDS, VARIANCES, Unstamped, stamp_ns
 from ..messages.topics import CONTACT, TopicNames
-from .images import images, looking
+from .images import Image, images, looking
 from .needed import (
     TYPES,
     Ends,
@@ -60,11 +60,16 @@ LEFT_OUT = (Unstamped, Late, Incomplete, OtherFrame)
 
 
 class Stream:
-    """Samples of one topic; memory is 8 bytes per number, whatever the message weighs."""
+    """
+    Samples of one topic; memory is 8 bytes per number, whatever the message weighs.
 
-    def __init__(self, topic: str, width: int) -> None:
+    kept: whether all are; left out, the last ones alone, of a bag that is only looked through.
+    """
+
+    def __init__(self, topic: str, width: int, *, kept: bool = True) -> None:
         self.topic = topic
         self.width = width
+        self._kept = kept
         self.messages = 0
         self.frames: set[str] = set()
         self._unstamped = self._late = self._repeated = 0
@@ -78,13 +83,19 @@ class Stream:
 
     def append(self, ns: int, values: Iterable[float]) -> None:
         """Add one sample, later than the one before."""
+        self._make_room()
         self._ns.append(ns)
         self._values.extend(values)
 
     def extend(self, ns: np.ndarray, rows: Array) -> None:
         """Add samples, shape (N,) and (N, width), later than those before."""
+        self._make_room()
         self._ns.frombytes(np.ascontiguousarray(ns, dtype=np.int64).tobytes())
         self._values.frombytes(np.ascontiguousarray(rows, dtype=np.float64).tobytes())
+
+    def _make_room(self) -> None:
+        if not self._kept:
+            del self._ns[:], self._values[:]
 
     def leave_out(self, error: DataError) -> None:
         """Count a message that gives no sample, by what is wrong with it."""
@@ -217,7 +228,7 @@ def fill_regular(
             each.read_waiting(bag, intake)
     except Exception:  # whatever is wrong with the bag, the other reader has the sentence for it
         return False
-    return all(len(streams[role]) == bag.topics[topic][1] for topic, role in roles.items())
+    return all(streams[role].messages == bag.topics[topic][1] for topic, role in roles.items())
 
 
 def _joint_rows(runs: list[Array], index: list[int], width: int) -> Array:
@@ -391,21 +402,9 @@ def read_recording(
 
     """
     names = TopicNames() if topics is None else topics
-    with BagReader(path) as bag:
-        roles = _roles(names, bag.topics)
-        streams, intake = _read(bag, names, roles, robot)
-        points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
-        made = bag.provenance
-        touched = marks(bag, names)
-        seen = [] if touched else images(bag, names)
-        if needs_measurements and not (touched or seen or {Role.POSE, Role.POINT} & set(roles)):
-            raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
-    if streams[Role.JOINTS].messages == intake.joints.others:
-        raise DataError(
-            f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
-            f'{robot.name!r}: {", ".join(robot.joint_names)}'
-            f'{other_names(robot, tuple(intake.joints.strangers))}'
-        )
+    streams, intake, points, made, touched, seen = _contents(
+        path, robot, names, needs_measurements=needs_measurements
+    )
     samples = {role: stream.samples() for role, stream in streams.items()}
     whole = assembled(
         Path(path).stem if Path(path).is_file() else Path(path).resolve().name,
@@ -422,6 +421,51 @@ def read_recording(
     if seen:
         whole = looking(whole, seen, names, made)
     return _with_what_is_missing(_inverted(whole, names), made, _ends(names, samples))
+
+
+class _Contents(NamedTuple):
+    """The streams of a bag, what took them, points beside poses, its making, touches, images."""
+
+    streams: dict[Role, Stream]
+    intake: Intake
+    points: int
+    made: dict[str, Any]
+    touched: list[Mark]
+    seen: list[Image]
+
+
+def _contents(
+    path: Path | str,
+    robot: Robot,
+    names: TopicNames,
+    *,
+    needs_measurements: bool,
+    kept: bool = True,  # whether all samples are, see `Stream`
+) -> _Contents:
+    """Return what is read of a bag, every message looked at; raise DataError as `read_recording`."""
+    with BagReader(path) as bag:
+        roles = _roles(names, bag.topics)
+        streams, intake = _read(bag, names, roles, robot, kept=kept)
+        points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
+        touched = marks(bag, names)
+        seen = [] if touched else images(bag, names)
+        if needs_measurements and not (touched or seen or {Role.POSE, Role.POINT} & set(roles)):
+            raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
+        made = bag.provenance
+    if streams[Role.JOINTS].messages == intake.joints.others:
+        raise DataError(
+            f"no message of '{names.joints}' in bag '{path}' holds a joint of robot "
+            f'{robot.name!r}: {", ".join(robot.joint_names)}'
+            f'{other_names(robot, tuple(intake.joints.strangers))}'
+        )
+    return _Contents(streams, intake, points, made, touched, seen)
+
+
+def refuse_unreadable(path: Path | str, robot: Robot, names: TopicNames) -> None:
+    """Raise DataError where a diagnosis would refuse a stream of a bag; keep nothing of it."""
+    what = _contents(path, robot, names, needs_measurements=True, kept=False)
+    for stream in what.streams.values():
+        stream.samples()
 
 
 def _counted(recording: Recording, made: Mapping[str, Any]) -> Recording:
@@ -496,27 +540,31 @@ def _topic(names: TopicNames, role: Role) -> str:
 
 
 def _read(
-    bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot
+    bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot, *, kept: bool
 ) -> tuple[dict[Role, Stream], Intake]:
     """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
     kinds = {role: bag.topics[topic][0] for role, topic in roles.items()}
-    streams, intake = _empty(names, roles, kinds, robot)
+    streams, intake = _empty(names, roles, kinds, robot, kept)
     one_each = {topic: role for role, topic in roles.items()}
     whole = not any(split_topic(getattr(names, role.value))[1] for role in roles)
     usual = whole and len(one_each) == len(roles)
     if not (usual and fill_regular(bag, one_each, streams, intake)):
-        streams, intake = _empty(names, roles, kinds, robot)
+        streams, intake = _empty(names, roles, kinds, robot, kept)
         _fill(bag, names, streams, intake, robot)
     return streams, intake
 
 
 def _empty(
-    names: TopicNames, roles: Mapping[Role, str], kinds: Mapping[Role, str], robot: Robot
+    names: TopicNames,
+    roles: Mapping[Role, str],
+    kinds: Mapping[Role, str],
+    robot: Robot,
+    kept: bool,
 ) -> tuple[dict[Role, Stream], Intake]:
     joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
     intake = Intake(robot, limits=False, joint_names=joint_names, efforts=names.use_effort)
     width = partial(Intake.width, robot=robot, efforts=names.use_effort)
-    each = {r: Stream(topic, width(r, kind=kinds[r])) for r, topic in roles.items()}
+    each = {r: Stream(topic, width(r, kind=kinds[r]), kept=kept) for r, topic in roles.items()}
     return each, intake
 
 

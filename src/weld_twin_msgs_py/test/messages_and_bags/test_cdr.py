@@ -50,25 +50,29 @@ def numbers_of(item):
     return [*map(ord, item.child_frame_id), p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 
 
+def pose_numbers(message):
+    position, rotation = from_messages.pose(message)
+    return [*position, *rotation.flat]
+
+
 P = np.arange(3.0)
 SURE = MAKE.pose_with_covariance(NS, P, TURN, np.diag(np.arange(1.0, 7.0)), 'tracker')
 FRAMES = TYPES.types['tf2_msgs/msg/TFMessage']([transform('a', 'bc'), transform('abc', 'd')])
 TEXT = TYPES.types['std_msgs/msg/String'](data='<robot name="Schweißer"/>')
-READ = from_messages
 SAMPLES = [
-    (SURE, lambda m: [*READ.pose(m)[0], READ.position_sigma(m)]),
+    (SURE, lambda m: [*pose_numbers(m), from_messages.position_sigma(m)]),
     (transform('tracker', 'probe'), numbers_of),
     (FRAMES, lambda m: [n for item in m.transforms for n in numbers_of(item)]),
-    (MAKE.pose(NS, P, TURN, 'tracker'), lambda m: [*READ.pose(m)[0], *READ.pose(m)[1].flat]),
-    (MAKE.point(NS, P, 'a'), READ.point),
-    (MAKE.vector3(NS, P, ''), READ.vector3),
-    (MAKE.wrench(NS, np.arange(6.0)), READ.wrench),
-    (MAKE.temperature(NS, 21.5, 'arm'), READ.temperature),
+    (MAKE.pose(NS, P, TURN, 'tracker'), pose_numbers),
+    (MAKE.point(NS, P, 'a'), from_messages.point),
+    (MAKE.vector3(NS, P, ''), from_messages.vector3),
+    (MAKE.wrench(NS, np.arange(6.0)), from_messages.wrench),
+    (MAKE.temperature(NS, 21.5, 'arm'), from_messages.temperature),
     (
         MAKE.joint_trajectory(NS, ('b', 'a'), MOTION),
-        lambda m: READ.joint_trajectory(m, ('a', 'b')).q,
+        lambda m: from_messages.joint_trajectory(m, ('a', 'b')).q,
     ),
-    (MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'), READ.path_points),
+    (MAKE.path(NS, np.tile(np.eye(4), (3, 1, 1)), 'world'), from_messages.path_points),
     (TEXT, lambda m: [ord(c) for c in m.data]),
 ]
 SAMPLES = {sample[0].__msgtype__: sample for sample in SAMPLES}

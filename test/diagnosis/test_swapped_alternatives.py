@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """What takes the place of what was found: what earns it by its own numbers, alone or in company."""
 
+import numpy as np
 import pytest
 from diagnosis_cells import effect, tiny
 
-from weld_twin_core.diagnosis.algebra.workspace import Part
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.algebra.workspace import Part, Role, ranking
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Alternative
-from weld_twin_core.diagnosis.hypotheses import search
-from weld_twin_core.diagnosis.hypotheses.alternatives import fit_alternatives
+from weld_twin_core.diagnosis.hypotheses import alternatives, search
 from weld_twin_core.diagnosis.hypotheses.other_sets import Other
 from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.effects.plausible import beyond
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
 
 TRUE = (
     effect('joint_offset', joint='elbow_joint', offset=6e-4),
@@ -51,7 +55,7 @@ def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(
     monkeypatch.setattr(
         type(work), 'fitted_with', lambda self, start, effect: starts.append(start) or now
     )
-    fit_alternatives(work, now, 0)
+    alternatives.fit_alternatives(work, now, 0)
     assert starts
     assert all(start.found[0].number('da') == beside.number('da') for start in starts)
 
@@ -65,7 +69,7 @@ def test_what_other_waves_of_a_joint_do_without_has_them_as_an_alternative():
     problem, model = tiny((ratio, third))
     work, now = search.workspace(problem, model.with_found((ratio, third)), (), Beliefs())
     instead = Other(Part(Site.of(ratio)), work.fitted(model.with_found((others,))), -0.5)
-    sites = [one.site for one in fit_alternatives(work, now, 0, [instead])[:2]]
+    sites = [one.site for one in alternatives.fit_alternatives(work, now, 0, [instead])[:2]]
     assert sites == [Site.of(ratio), Site.of(others)]
 
 
@@ -122,3 +126,27 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
     monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets: (now, ()))
     kept, _ = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
+
+
+@pytest.mark.parametrize('source', ['shoulder_lift_joint', 'wrist_1_joint'])
+def test_a_joint_at_rest_may_be_turned_by_whichever_neighbour_could(source):
+    """Near zero the one had to turn it by more than gears leak; at rest either does it alike."""
+    problem, model = tiny()
+    q = problem.recordings[0].joints.q.copy()
+    q[:, 1:4] = -1.0, 1.2, 0.01
+    still = Recording('still', JointMotion(np.arange(float(len(q))), q, static=True))
+    zero = effect('joint_offset', joint='elbow_joint', offset=1e-3)
+    seen = Twin(model.robot, [zero]).poses(still).position
+    seen = seen + np.random.default_rng(5).normal(scale=2e-5, size=seen.shape)
+    problem = Problem((still.with_measured(Measurements(still.joints.t, seen)),))
+    work, now = search.workspace(problem, model, (), Beliefs())
+    seeds = [seed for unit in work.library.units for seed in unit.seeds]
+    mine = [
+        (s.name, s.site, getattr(s, 'source', '')) == ('joint_coupling', 'elbow_joint', source)
+        for s in seeds
+    ]
+    systems, units = work.beside(now), work.library.units
+    (choice,) = ranking(systems, units, 100.0, roles=tuple(Role), open_to=np.array(mine))
+    possible = alternatives._possible(work, now.model, choice, now, 100.0)
+    assert possible.rss < 0.01 * now.rss
+    assert beyond(model.robot, *possible.model.found) == []

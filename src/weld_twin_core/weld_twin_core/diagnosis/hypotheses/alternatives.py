@@ -20,6 +20,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
+from ..algebra.problem import Model
 from ..algebra.workspace import Choice, Part, Role, Workspace, lead, parts
 from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
@@ -34,7 +35,8 @@ def fit_alternatives(
     """Return found effect k and what could take its place, in company (``others``), likeliest first."""
     place = Site.of(now.model.found[k])
     rest = work.without(now, k)
-    ranked = work.ranked(rest, work.effective(now), roles=Role)
+    count = work.effective(now)
+    ranked = work.ranked(rest, count, roles=Role)
     own = next((c for c in ranked if c.unit.site == place), None)
     # Started from what the others are beside the found effect: without it they may have gone far off.
     start = now.model.without(k)
@@ -42,7 +44,7 @@ def fit_alternatives(
         (choice, other)
         for role in Role
         for choice in _near(work, ranked, role, sites(now))
-        if not implausible((other := work.fitted_with(start, choice.effect())).model)
+        if (other := _possible(work, start, choice, rest, count)) is not None
     ]
     count = work.independent([now, *(f for _, f in tried)])
 
@@ -69,6 +71,21 @@ def fit_alternatives(
         if first is not None:
             out.append(Alternative(first.site, out[0].log_bayes + instead.ahead, instead.fit))
     return _weighed(out, work.beliefs.temperature)
+
+
+def _possible(
+    work: Workspace, start: Model, choice: Choice, rest: Fit, count: float
+) -> Fit | None:
+    """
+    Return the fit of a model with the form of a choice that machines have and that explains most.
+
+    A joint at rest beside two others at rest may be turned by either; one may be too near zero for it.
+    """
+    best = choice.effect()
+    forms = {**{seed.key: seed for seed in choice.unit.seeds}, best.key: best}
+    fits = [work.fitted_with(start, effect) for effect in forms.values()]
+    possible = [fit for fit in fits if not implausible(fit.model)]
+    return max(possible, key=lambda fit: lead(fit, rest, 0.0, count), default=None)
 
 
 def _parts(result: Fit) -> list[Part]:

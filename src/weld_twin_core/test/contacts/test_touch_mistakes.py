@@ -3,6 +3,7 @@
 """Postures that are not what they are called: told of, and not fitted."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.soundness.touches import touches
+from weld_twin_core.diagnosis.soundness.touches import _loose, touches
 from weld_twin_core.diagnosis.unseen.groups import all_groups
 from weld_twin_core.motion.inverse.newton import reaching
 
@@ -87,6 +88,13 @@ def test_swapped_files_are_not_mended(sound, robot):
     assert mended == []
     assert len(wrong) == 1
     assert wrong[0].startswith("'a' and 'b' are 50 mm apart by the artefact and ")
+
+
+def test_recordings_of_one_instrument_have_one_noise_and_touches_their_own():
+    touched = SimpleNamespace(freedom=90)  # of 120 numbers: the noise is twice what is left
+    problem = SimpleNamespace(given=(0, 1, 2), contact=[None, None, touched].__getitem__)
+    rows = [np.full((6, 60), 1e-4), np.full((6, 40), 4e-4), np.full((6, 40), 5e-4)]
+    assert _loose(problem, rows) == pytest.approx((1.0, 1.0, 10.0))
 
 
 def test_contacts_have_no_instrument_that_could_be_at_fault(sound, robot):

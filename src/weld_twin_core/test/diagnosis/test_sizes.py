@@ -98,10 +98,10 @@ def test_sizes_are_drawn_as_often_as_the_normal_law_of_the_rows_says():
     rng = np.random.default_rng(5)
     frame, one, other, more = rng.normal(size=(4, 12))
     columns = np.stack([frame, one, other, one + 0.5 * more])
-    residual = 3.0 * one + rng.normal(size=12)
+    residual = 10.0 * one + rng.normal(size=12)
     middle, width = np.array([0.0, 0.5, -1.0, 1.0]), np.array([50.0, 1.0, 2.0, 3.0])
     prior = Prior(middle, width, np.array([-1, 0, 0, 1]), NO.repeat(2), np.array([True, False]))
-    noise, share = 1.3, 0.8
+    noise, share = 30.0, 0.8
     chain = _Chain(Rows(columns, residual, share), prior, noise)
     often = np.zeros((2, SIZES.size))
     for _ in range(2000):
@@ -117,7 +117,7 @@ def test_sizes_are_drawn_as_often_as_the_normal_law_of_the_rows_says():
         likely = off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1]
         law[i, j] = np.exp(-likely / 2.0) * BELIEF[i] * BELIEF[j]
     law /= law.sum()
-    np.testing.assert_allclose(often, [law.sum(axis=1), law.sum(axis=0)], atol=0.05)
+    np.testing.assert_allclose(often, [law.sum(axis=1), law.sum(axis=0)], atol=0.03)
 
 
 ROWS = 400

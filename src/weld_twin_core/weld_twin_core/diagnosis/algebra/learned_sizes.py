@@ -76,7 +76,7 @@ def learned_precision(
 def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:
     """Return the variance that every group starts from, and the most that it may have, (G,)."""
     # A group too small to be tied keeps its number, without a member.
-    variance = np.ones(labels.max(initial=-1) + 1)
+    variance = np.ones(labels.max() + 1)
     most = np.full(variance.size, np.inf)
     for k in np.unique(labels[labels >= 0]):
         most[k] = usual[labels == k].mean()

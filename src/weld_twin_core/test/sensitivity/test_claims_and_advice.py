@@ -97,7 +97,11 @@ def test_moving_the_base_keeps_the_seam_where_it_is(ur5):
     np.testing.assert_allclose(there.nominal.position, here.nominal.position, atol=1e-9)
 
 
-def test_claims_of_identities_are_measured_as_such(case):
+def test_claims_of_identities_are_measured_as_such(case, ur5):
+    # Levers of a wrist: both lengths beyond an axis, the last length, and a tool on its axis.
+    wrist = (np.hypot(ur5.d[4], ur5.d[5]) + ur5.d[5]) / 3.0
+    inner = 2.0 * case['S_theta_mean_m'] - wrist
+    assert case['distal_ratio'] == pytest.approx(wrist / inner, rel=1e-3)
     assert case['baseline_d_norm'] < 1e-9
     assert case['init_S'] == pytest.approx(1.0, abs=1e-9)
     assert case['S_a_min'] == pytest.approx(1.0) == case['S_a_max']

@@ -59,6 +59,24 @@ def test_a_step_of_four_standard_errors_is_found_within_three_recordings(seed):
     assert found[0].std < error
 
 
+def test_two_steps_of_one_coordinate_are_as_well_known_as_one():
+    """Of an instant at which the other step is nothing is left to be known."""
+    error = np.sqrt(year(3)[30].covariance[5, 5])
+    up, down = only(5, 4.0 * error, 12), only(5, -4.0 * error, 26)
+    found = changes(year(3, lambda week: up(week) + down(week), weeks=40))
+    assert [each.name for each in found] == [NAMES[5]] * 2
+    assert all(each.std < error for each in found)
+
+
+def test_a_trend_on_top_of_another_is_told_as_such():
+    error = np.sqrt(year(3)[20].covariance[5, 5])
+    rise = [1.5 * error * (week - 3 * max(week - 10, 0)) for week in range(20)]
+    line = [each * (np.arange(COUNT) == 5) for each in rise]
+    found = sorted(changes(year(3, line.__getitem__, weeks=20)), key=lambda each: each.day)
+    assert [(each.kind, each.faster) for each in found] == [('trend', False), ('trend', True)]
+    assert found[0].size > 0.0 > found[1].size
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_what_stays_as_it_is_makes_diagnoses_comparable(seed):
     # Of ten coordinates each diagnosis sees hardly more than what they come to together with the

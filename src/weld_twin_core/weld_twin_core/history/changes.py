@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -225,6 +225,8 @@ class Change:
     """Other coordinates whose change would explain the same."""
     since: float | None = None
     """Of a step: earliest day from which a trend explains it as well; None where none does."""
+    faster: bool = False
+    """Of a trend: whether it comes on top of an earlier one of the same coordinate."""
 
 
 class _Term(NamedTuple):
@@ -276,7 +278,15 @@ def changes(
         if more is None:
             break
         taken.append(more)
-    return tuple(change for _, change in look.settled(taken))
+    return _on_top([change for _, change in look.settled(taken)])
+
+
+def _on_top(result: Sequence[Change]) -> tuple[Change, ...]:
+    """Return changes with each trend known for what it is beside an earlier one of its coordinate."""
+    begun = [(each.name, each.day) for each in result if each.kind == 'trend']
+    earlier = (any(n == one.name and day < one.day for n, day in begun) for one in result)
+    pairs = zip(result, earlier, strict=True)
+    return tuple(replace(one, faster=one.kind == 'trend' and more) for one, more in pairs)
 
 
 class _Look(NamedTuple):
@@ -502,19 +512,21 @@ class _System:
             sizes.append(
                 float(np.hypot(*mean[place])) if mean.shape[1] == 2 else float(mean[place, 0])
             )
-            variances.append(
-                scatter / max(float(np.linalg.eigvalsh(information[place])[0]), 1e-300)
-            )
+            known = information[place] / scatter + self._believed(shape, place)
+            variances.append(1.0 / float(np.linalg.eigvalsh(known)[0]))
         middle = float(weight @ sizes)
         spread = weight @ (np.array(variances) + (np.array(sizes) - middle) ** 2)
         return middle, float(np.sqrt(spread))
+
+    def _believed(self, shape: _Shape, place: int) -> Array:
+        """Return the prior's precision (m, m): a value's own holds for how far it moves."""
+        return np.asarray(self._series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2))
 
     def odds(self, shape: _Shape, place: int, scatter: float) -> float:
         """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
         mean, information = self.sizes(shape)
         known = information[place] / scatter
-        # What was believed of a value holds for how far it moves over the recordings.
-        prior = self._series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
+        prior = self._believed(shape, place)
         shown = known @ mean[place]
         fall = shown @ np.linalg.solve(known + prior, shown)
         return 0.5 * float(

@@ -159,7 +159,8 @@ def sentence(change: Change) -> str:
             said = f'{what.words}: changed by {size}, at once {when} or {slowly}'
     elif change.kind == 'trend':
         size = uncertain(change.size * WEEK, change.std * WEEK, what.factor, what.unit)
-        said = f'{what.words}: moves by {size} a week since {date(change.day)}'
+        more = ' on top of how it moved before' if change.faster else ''
+        said = f'{what.words}: moves by {size} a week since {date(change.day)}{more}'
     else:
         size = uncertain(change.size, change.std, what.factor, what.unit)
         said = f'{what.words}: swings by {size} with the seasons'

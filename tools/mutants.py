@@ -58,7 +58,7 @@ TESTS = {
     'recordings_together',
     'frames': 'alignment changes known_places touches steps_by_hand',
     'soundness': 'alignment checks_by_hand mends mixups_by_hand soundness trials steps_by_hand bundle '
-    'touch_mistakes tracker_beside',
+    'touch_mistakes tracker_beside measured_efforts',
     'unseen': 'unseen_stretches chance folds levels noise_and_interval steps_by_hand '
     'touch_mistakes touches known_places fit many_small_errors recordings_together',
     'many': 'many_small_errors small_errors learned_priors needed_kinds recordings_together',
@@ -96,6 +96,9 @@ ALIKE = {
     f'{ENGINE}.many.fitted_together._relearned: '
     'result.final.coordinates.size <= MANY -> result.final.coordinates.size < MANY': (
         'with exactly so many either way will do'
+    ),
+    f'{ENGINE}.unseen.unseen_stretches.Unseen._asked: 1 -> 0': (
+        'a residual from which nothing is taken is itself, found without what might be taken'
     ),
     f'{ENGINE}.soundness.suspicions.turned_bases: 1.0 -> 1.25': (
         'turns of axes onto axes are tens of degrees from where it counts'

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -171,6 +172,15 @@ def test_a_true_staircase_is_chosen_again_without_any_stretch(static):
     assert unseen.rms(unseen.whole) == pytest.approx(unseen.rms(found.residual), rel=1e-9)
     assert unseen.wandered()[0] < 1.0
     assert unseen.missed().min() > 0.5, 'every part is predicted worse without it'
+
+
+def test_six_rows_that_are_as_sure_count_as_three():
+    problem = SimpleNamespace(roots=[np.eye(6), None], by_sample=lambda rows: rows)
+    unseen = SimpleNamespace(
+        problem=problem, scale=Scale(2e-5, 1e-5, (np.ones(4),) * 2), _trusted=lambda parts: parts
+    )
+    squares = Unseen.squares(unseen, [np.ones((4, 6)), np.ones((4, 6))])
+    np.testing.assert_allclose(squares, 3.0 * 2e-5**2)
 
 
 def test_a_model_without_frames_and_effects_predicts_its_target():

@@ -8,6 +8,7 @@ import pytest
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.clearance import Space, _clearances, body
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import transform
 
 UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])
 FOLDED = np.array([0.0, -1.4, 3.0, 0.0, 0.0, 0.0])
@@ -56,6 +57,9 @@ def test_links_are_as_far_apart_as_points_on_them_are(ur5):
         ]
         nearest.append(min(gaps))
     np.testing.assert_allclose(_clearances(shape).min(axis=1), nearest, atol=0.05)
+    elsewhere = ur5.with_frames(base=transform(np.eye(3), np.array([5.0, -3.0, 2.0])))
+    there = _clearances(body(elsewhere, np.array([UPRIGHT, FOLDED])))
+    np.testing.assert_allclose(there, _clearances(shape), atol=1e-12)
 
 
 @pytest.mark.parametrize('name', catalog.names())

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lenses and the noise of poses, against formulas written out here and finite differences."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -87,3 +89,9 @@ def test_a_covariance_that_somebody_typed_in_tells_nothing():
 def test_a_lens_without_a_focal_length_is_refused():
     with pytest.raises(DataError, match='focal'):
         Lens([0.0, 800.0], [320.0, 240.0], [])
+
+
+@pytest.mark.parametrize(('count', 'known'), [(3, False), (4, True), (6, False), (8, True)])
+def test_a_lens_is_bent_by_as_many_numbers_as_opencv_writes(count, known):
+    with nullcontext() if known else pytest.raises(DataError, match=f'got {count}'):
+        assert Lens([1.0, 1.0], [0.0, 0.0], [0.1] * count).distortion.sum() == 0.1 * count

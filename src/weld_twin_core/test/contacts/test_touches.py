@@ -164,6 +164,11 @@ def surface_points(kind, rng):
     return 0.05 * ways / np.linalg.norm(ways, axis=1)[:, None] + [0.1, 0.2, 0.0]
 
 
+def test_a_posture_has_as_many_rows_as_the_kind_that_gives_most():
+    artefact = Artefact((Contact('a', 'plane'), Contact('b', 'line'), Contact('c', 'point')))
+    assert Contacts(artefact, ('a', 'b', 'a')).rows == 2
+
+
 def test_spread_is_the_mean_distance_to_the_middle():
     points = np.array([[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [5.0, 1.0, 0.0], [5.0, 1.0, 0.004]])
     artefact = Artefact((Contact('a'), Contact('b')))

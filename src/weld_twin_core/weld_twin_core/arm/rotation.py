@@ -91,7 +91,7 @@ def _from_quaternion(quaternion: Array) -> Array:
     vector, w = quaternion[..., :3], quaternion[..., 3]
     length = np.linalg.norm(vector, axis=-1)
     angle = 2.0 * np.arctan2(length, w)
-    ratio = np.divide(angle, length, out=np.full(angle.shape, 2.0), where=length > 0.0)
+    ratio = np.divide(angle, length, out=np.zeros_like(angle), where=length > 0.0)
     return np.asarray(ratio[..., None] * vector)
 
 

@@ -55,10 +55,12 @@ def test_times_of_day_and_dates_are_stamps(tmp_path, names, text):
     assert (recording.epoch_ns // 10**9 // 86_400 == 20_779) == dated, said
 
 
-def test_signs_offsets_and_a_coupled_joint_are_undone(tmp_path):
+@pytest.mark.parametrize('first', [0, 1])
+def test_signs_offsets_and_a_coupled_joint_are_undone(tmp_path, first):
     shown = np.degrees(Q) * [1, -1, 1, 1, -1, 1] - [0, 90, 0, 0, 0, 180] * np.array([1, -1] * 3)
     shown[:, 2] -= -(shown[:, 1])
-    head = [*numbered('J', joined=''), 'x [mm]', 'y [mm]', 'z [mm]', *numbered('tau_', joined='')]
+    head = [*numbered('J', joined=''), 'x [mm]', 'y [mm]', 'z [mm]']
+    head += numbered('tau_', start=first, joined='')
     efforts = np.random.default_rng(9).normal(size=shown.shape).round(6)
     lines = [
         ','.join(f'{v:.6f}' for v in row) for row in np.column_stack([shown, POINT * 1e3, efforts])

@@ -82,6 +82,7 @@ FIRST = 'test_kept_answers'
 LONGEST = 30
 """Seconds of processor time after which a mutant that comes to no end is caught."""
 ALIKE = {
+    f'{ENGINE}.advice.next_touches._touchable: 0 -> -1': 'touches of a new place are at one point',
     f'{ENGINE}.algebra.columns.rows_of: (np.diff(labels) >= 0).all() -> never': (
         'rows that lie together are told one by one, and are the same'
     ),

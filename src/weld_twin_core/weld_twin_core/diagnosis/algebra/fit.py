@@ -278,8 +278,7 @@ def robust_scale(
     """
     given = problem.given_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, given, strict=True)]
-    size = max(problem.size, 1)
-    kept = max(1.0 - freedom / size, 0.0)
+    kept = max(1.0 - freedom / problem.size, 0.0)
     # Shifts and turns as sure as usual ones.
     residuals = [
         part if root is None else np.einsum('mij,jm->im', root, part)
@@ -290,7 +289,7 @@ def robust_scale(
     sigma, sigma_turn = robust_spread(position), robust_spread(turn) if turn.size else 1.0
     if freedom > 0.0:
         # As many coordinates as rows leave nothing of a noise that is there all the same.
-        trust = NOISE_TRUST / size
+        trust = NOISE_TRUST / problem.size
         sigma, sigma_turn = (
             float(np.sqrt((own**2 + trust * least_own**2) / (kept + trust)))
             for own, least_own in ((sigma, LEAST_NOISE), (sigma_turn, LEAST_NOISE / PROBE))

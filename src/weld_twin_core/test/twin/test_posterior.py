@@ -208,17 +208,19 @@ def test_effects_at_the_middle_move_the_tool_as_far_as_the_models_in_the_middle_
     )
     wave = found[1].search.with_orders(np.array([1.0, 2.0]))
     kinds = (REGISTRY['joint_offset'](joint, 0.0), found[0], wave)
-    what = Directions((), 1, kinds)
+    what = Directions(('base', 'tool'), 2, kinds)
     known = posterior(robot, what, np.diag(np.full(what.count, 1e-10)))
-    mean = np.array([3e-5, -2e-5, 1e-5, 2e-5, -1e-5, 3e-5])
+    own = [3e-5, -2e-5, 1e-5, 2e-5, -1e-5, 3e-5]
+    mean = np.concatenate([np.linspace(-4e-5, 4e-5, what.frame_count), own])
     known = replace(known, mean=mean, middle=0.5)
     effects, rest = known.centred(found)
+    effects = (*effects, *known.moved_frames(1))
     np.testing.assert_allclose(rest.mean, 0.5 * mean, rtol=1e-9)
     assert found[2] in effects
     still = Recording('m', JointMotion(np.arange(7.0), np.linspace(-1.0, 1.0, 42).reshape(7, 6)))
     fitted = Twin(robot, found)
     features = Features(fitted, still, still.joints.t)
-    foretold = 0.5 * np.tensordot(mean, what.columns(features, 0), axes=(0, 0))[:3].T
+    foretold = 0.5 * np.tensordot(mean, what.columns(features, 1), axes=(0, 0))[:3].T
     moved = Twin(robot, effects).poses(still).position - fitted.poses(still).position
     np.testing.assert_allclose(moved, foretold, atol=2e-8)
     same, nothing = replace(known, middle=0.0).centred(found)

@@ -27,6 +27,7 @@ from ..arm.robot import Robot
 from ..arrays import Array, halton, readonly
 from ..effects.dated import of_the_robot
 from ..effects.effect import Effect
+from ..effects.geometry import BasePose, FrameError, ToolPose
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, JointSignal, Recording, Signal
 from .compensation import commandable
@@ -242,6 +243,21 @@ class Posterior:
         what = replace(self.directions, effects=tuple(effects))
         centred = replace(self, directions=what, mean=self.mean - step, single=None, middle=0.0)
         return (*effects, *waves, *others), centred
+
+    def moved_frames(self, setup: int = 0) -> tuple[Effect, ...]:
+        """
+        Return how far the middle of the allowed models has fitted frames from where the fit has them.
+
+        A base that turns and an error of the arm that turns it back hardly show; whoever takes the
+        error for true has to take the turn, too.
+        """
+        step, what = self.middle * self.mean, self.directions
+        at = {'base': 6 * setup, 'tool': what.frame_count - 6}
+        kinds: dict[str, type[FrameError]] = {'base': BasePose, 'tool': ToolPose}
+        each = {name: step[at[name] : at[name] + 6] for name in what.frames}
+        return tuple(
+            kinds[name](xyz=six[:3], rotvec=six[3:]) for name, six in each.items() if six.any()
+        )
 
     def after(self, features: Features, noise: float) -> Posterior:
         """Return how sure a model fitted anew will be, poses measured with a coordinate's noise [m]."""

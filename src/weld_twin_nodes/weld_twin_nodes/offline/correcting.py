@@ -100,7 +100,9 @@ def program_model(
         placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
         result, posterior = from_now_on(model.found), read_posterior(robot, path)
         if posterior is not None:
+            frames = posterior.moved_frames(setup)
             result, posterior = posterior.of_the_arm().centred(result)
+            result = (*result, *frames)
         effects = (*from_now_on(model.known), *result)
         _refuse_by_effort(effects, path)
         return ProgramModel(placed, effects, posterior, temperature, setup)
@@ -185,10 +187,11 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         for step in program.steps
         if step.end is not None and _has_tool(context, step.tool)
     ]
-    named = any(effect.name == 'tool_pose' for effect in model.effects)
-    if named and not all(model.same_tool(tool) for tool in tools):
+    fitted = model.posterior.directions.frames if model.posterior else ()
+    errors = {effect.name for effect in model.effects if effect.traits.fitted_with not in fitted}
+    if 'tool_pose' in errors and not all(model.same_tool(tool) for tool in tools):
         out.append(TOOL_LEFT)
-    if any(effect.name == 'base_pose' for effect in model.effects):
+    if 'base_pose' in errors:
         out.append(BASE_MOVED)
     remaining = [e.name for e in model.effects if e not in model.acting]
     if remaining:
@@ -197,8 +200,8 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         out.append('the model has nothing that a program could mend, and no point was moved')
     if model.posterior is None:
         out.append(NOT_SURE)
-    elif frames := model.posterior.directions.frames:
-        out.append(FRAMES_FITTED.format(frames=', '.join(frames)))
+    elif fitted:
+        out.append(FRAMES_FITTED.format(frames=', '.join(fitted)))
     return out
 
 

@@ -304,6 +304,7 @@ krl | @based / BASE_DATA[i] = F | set anew
 krl | FRAME F=@frame / $BASE = F / F.X = F.X + 10 | set anew
 krl | POS F=@frame / F = XP1 / $BASE = F | set anew
 krl | @based / base_data[2] = F | set anew
+krl | $BASE = BASE_DATA[2] / BASE_DATA[2] = @frame | set anew
 krl | DECL FRAME F=@frame / measured(F) / $BASE = F | set anew
 krl | $IPO_MODE = #TCP | the tool stands still
 krl | DECL FDAT FX={TOOL_NO 0,BASE_NO 0,IPO_FRAME #TCP} / FDAT_ACT=FX | stands still

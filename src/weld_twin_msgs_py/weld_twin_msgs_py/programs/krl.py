@@ -218,9 +218,13 @@ class KrlReader(Reader):
         for file, text in enumerate(self.texts):
             for result in _SET.finditer(text):
                 if result[1].upper().endswith(']') and '_DATA' in result[1].upper():
-                    value = self._frame_at(file, *result.span(2))
+                    value, name = self._frame_at(file, *result.span(2)), result[1].upper()
                     if value is not None:
-                        self.frames[result[1].upper()] = value
+                        self.frames[name] = value
+                    # What is used above that has other numbers, of which nobody knows here.
+                    if name in re.sub(r'\s', '', text[: result.start()].upper()):
+                        where = self.sources[file].where(result.start(1))
+                        self.again.setdefault(name.lower(), where)
 
     def _aggregate(self, file: int, start: int, end: int) -> Aggregate:
         """Return the components of ``{...}``; nested ones are left as text."""

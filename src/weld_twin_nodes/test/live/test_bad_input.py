@@ -237,7 +237,7 @@ def test_what_a_model_has_otherwise_than_the_cell_is_told(cell, robot, tmp_path)
     }
     arm = tmp_path / 'robot.yaml'
     arm.write_text(json.dumps(robot.to_mapping()))
-    inputs = [{'use': 'robot', 'sha256': 'as it was'}]
+    inputs = [{'use': 'robot', 'path': 'robot.yaml', 'sha256': 'as it was'}]
     content = {'schema': 'weld_twin/diagnosis/1', 'model': model, 'inputs': inputs}
     file.write_text(json.dumps(content))
     node = cell.start('forward_kinematics_twin', robot=str(arm), model=str(file))

@@ -9,7 +9,11 @@ from diagnosis_cells import HOME, all_but, effect, known_scale, tiny
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.algebra.starts import started
+from weld_twin_core.diagnosis.algebra.workspace import Workspace
+from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 
@@ -104,3 +108,20 @@ def test_a_joint_at_rest_gives_way_as_others_change_its_load(kind):
     seen = seen + np.random.default_rng(5).normal(scale=2e-5, size=seen.shape)
     found = diagnose(run.with_measured(Measurements(t, seen)), robot, experiment=False)
     assert [(e.effect.name, e.effect.joint) for e in found.effects] == [(kind, 'elbow_joint')]
+
+
+def test_what_is_left_alone_at_its_joint_is_searched_for_anew():
+    """Beside a spring that stiffens, play may stand for what the other does not."""
+    problem, model = tiny(count=60)
+    still = problem.recordings[0]
+    play = effect('loaded_play', joint='shoulder_lift_joint', width=2.2e-3, torque=2.9)
+    seen = Twin(model.robot, [play]).poses(still).position
+    seen = seen + np.random.default_rng(5).normal(scale=2e-5, size=seen.shape)
+    problem = Problem((still.with_measured(Measurements(still.joints.t, seen)),))
+    wrong = effect('loaded_play', joint='shoulder_lift_joint', width=1e-4, torque=30.0)
+    spring = effect('stiffening', joint='shoulder_lift_joint', compliance=1e-4, torque=3.0)
+    scale = known_scale(problem)
+    work = Workspace(problem, scale, build(problem, model, scale), Beliefs(), 1.0)
+    now = work.fitted(model.with_found((wrong, spring)))
+    (left,) = work.without(now, 1).model.found
+    assert left.torque == pytest.approx(2.9, rel=0.1)

@@ -325,10 +325,18 @@ class Workspace:
         return self.effective(min(fits, key=lambda f: f.rss))
 
     def without(self, now: Fit, k: int) -> Fit:
-        """Return the fit without found effect k of another, made once."""
+        """
+        Return the fit without found effect k of another, made once.
+
+        What is searched for at its joint is searched for anew: it may have left to it what it is.
+        """
         known = self._without.setdefault(now, {})
         if k not in known:
-            known[k] = self.fitted(now.model.without(k))
+            bare = self.fitted(now.model.without(k))
+            gone, found = now.model.found[k], bare.model.found
+            beside = [i for i, e in enumerate(found) if e.site == gone.site and e.fit.searched]
+            fits = [bare, *(self.fitted_with(bare.model.without(i), found[i]) for i in beside)]
+            known[k] = min(fits, key=lambda one: one.rss)
         return known[k]
 
     def predict_without(self, now: Fit) -> list[tuple[float, float]]:

@@ -56,6 +56,10 @@ def parts(effect: Effect) -> list[Part]:
     return [Part(site, order) for order in effect.search.orders().tolist()] or [Part(site)]
 
 
+def parts_of(result: Fit) -> list[Part]:
+    return [part for effect in result.model.found for part in parts(effect)]
+
+
 @dataclass(frozen=True, eq=False)
 class Unit:
     """One family on one joint: the smallest thing a verdict can name."""
@@ -375,7 +379,7 @@ class Workspace:
         trials = {unit.site: float(np.log(unit.trials)) for unit in self.library.units}
 
         def cost(result: Fit) -> float:
-            each = (part for effect in result.model.found for part in parts(effect))
+            each = parts_of(result)
             return sum(trials.get(part.site, 0.0) + self.beliefs.enter_log_bayes for part in each)
 
         more = float(own.coordinates.size - now.coordinates.size)

@@ -21,7 +21,7 @@ from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..algebra.motions import constant, of_no_size, same_error
 from ..algebra.problem import Model
-from ..algebra.workspace import Choice, Part, Role, Workspace, lead, parts
+from ..algebra.workspace import Choice, Part, Role, Workspace, lead, parts_of
 from ..beliefs import SHORTLIST
 from ..evidence import Alternative, CandidateSet
 from ..result import Site
@@ -65,8 +65,8 @@ def fit_alternatives(
         out.append(Alternative(*each, role=choice.unit.role))
     for instead in (one for one in others if one.instead_of == Part(place)):
         # What it has that was not found, what entered first before the others; or another wave.
-        known = {*_parts(now), *(Part(one.site) for one in out)}
-        first = next((part for part in _parts(instead.fit) if part not in known), None)
+        known = {*parts_of(now), *(Part(one.site) for one in out)}
+        first = next((part for part in parts_of(instead.fit) if part not in known), None)
         if first is not None:
             out.append(Alternative(first.site, out[0].log_bayes + instead.ahead, instead.fit))
     return _weighed(out, work.beliefs.temperature)
@@ -85,10 +85,6 @@ def _possible(
     fits = [work.fitted_with(start, effect) for effect in forms.values()]
     possible = [fit for fit in fits if not implausible(fit.model)]
     return max(possible, key=lambda fit: lead(fit, rest, 0.0, count), default=None)
-
-
-def _parts(result: Fit) -> list[Part]:
-    return [part for effect in result.model.found for part in parts(effect)]
 
 
 def _near(

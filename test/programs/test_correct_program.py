@@ -363,6 +363,38 @@ def test_a_seam_with_a_move_that_is_worked_out_is_left_whole(line, tmp_path):
     assert (tmp_path / 'out' / 'seam.script').read_text().splitlines()[:5] == text.splitlines()[:5]
 
 
+def test_a_weld_of_increments_is_written_in_full_and_goes_where_it_meant(tmp_path):
+    name, _, reader, near = CELLS['krl']
+    robot = wt.load(name)
+    tool = tool_of(robot, 'krl')
+    first = tool_pose(robot, np.radians(near), tool) @ along(2, 0.02)
+    turned = Rotation.from_matrix(first[:3, :3]).as_euler('ZYX', degrees=True)
+    values = zip('XYZABC', [*first[:3, 3] * 1e3, *turned], strict=True)
+    axes = ','.join(f'A{k + 1} {value}' for k, value in enumerate(near))
+    lines = [
+        'DEF seam( )',
+        '$BASE = $NULLFRAME',
+        '$TOOL = {X 0,Y 0,Z 250,A 0,B 0,C 0}',
+        f'PTP {{{axes}}}',
+        f'LIN {{{",".join(f"{key} {value:.6f}" for key, value in values)}}}',
+        'LIN_REL {Y 150} C_DIS ; weld',
+        'LIN_REL {Z -50.0} #TOOL ; away',
+        'END',
+    ]
+    model, path = tmp_path / 'found.yaml', tmp_path / 'seam.src'
+    model.write_text(effects(robot))
+    path.write_text('\n'.join(lines))
+    assert 'seam.src line 6' in done(*words(path, name, tmp_path / 'out', model))
+    (text,) = texts(tmp_path / 'out', ['seam.src'])
+    assert ' C_DIS ; weld ; was LIN_REL {Y 150}\n' in text
+    assert ' ; away ; was LIN_REL {Z -50.0} #TOOL\n' in text
+    weld = first.copy()
+    weld[1, 3] += 0.15
+    goals = [first, weld, weld @ along(2, -0.05)]
+    real = driven(robot, tool, reader([text]), near)[1:]
+    assert max(np.abs(g - r)[:3].max() for g, r in zip(goals, real, strict=True)) < 4e-6
+
+
 FANUC_TURN = """/PROG  P
 /MN
    1:  J P[1] 20% FINE    ;

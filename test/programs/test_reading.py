@@ -215,6 +215,7 @@ def test_an_abb_move_is_as_fast_as_its_line_says(speed, told):
     'line',
     [
         'LIN_REL {X 5}',
+        'PTP_REL {A1 5}',
         'LIN {X 5,Y 1}',
         'LIN XP1:XP2',
         'SPL XP1',
@@ -229,6 +230,32 @@ def test_kuka_moves_that_are_not_understood_say_so(line):
     text = 'DEF a()\n' + point.format('XP1') + point.format('XP2') + f'{line}\nEND\n'
     (step,) = read('krl', (text,)).steps
     assert step.end is None and step.why
+
+
+@pytest.mark.parametrize(
+    ('between', 'move', 'why'),
+    [
+        ('$OUT[5]=TRUE\nWAIT SEC 0.4\n$VEL.CP=0.01\n', 'LIN_REL {X 5, A 0}', ''),
+        ('', 'SLIN_REL {X -5} C_DIS #BASE', ''),
+        ('', 'LIN_REL {A 5}', 'turns the tool'),
+        ('', 'LIN_REL {X 5, E1 10}', 'external axes'),
+        ('', 'LIN_REL XP1', 'worked out'),
+        ('$BASE = {X 1,Y 2,Z 3,A 0,B 0,C 0}\n', 'LIN_REL {X 5}', 'in this tool and base'),
+        ('PTP {A1 0,A2 -90,A3 90,A4 0,A5 5,A6 0}\n', 'LIN_REL {X 5}', 'in this tool and base'),
+        ('IF $IN[1] THEN\n', 'LIN_REL {X 5}', 'from elsewhere'),
+        ('LOOP\n', 'LIN_REL {X 5}', 'from elsewhere'),
+        ('again:\n', 'LIN_REL {X 5}', 'from elsewhere'),
+        ('clean()\n', 'LIN_REL {X 5}', 'from elsewhere'),
+        ('LIN XP2\n', 'LIN_REL {X 5}', 'from elsewhere'),
+        ('END\nDEF b()\n', 'LIN_REL {X 5}', 'from elsewhere'),
+    ],
+)
+def test_a_kuka_move_counts_from_the_point_before_where_nothing_else_leads_there(
+    between, move, why
+):
+    lines = f'LIN {{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n{between}{move}\n'
+    last = read('krl', (f'DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{lines}END\n',)).steps[-1]
+    assert (why in last.why) if why else (last.end is not None and not last.why)
 
 
 BEFORE = {

@@ -27,6 +27,14 @@ Astray = Callable[[Controller, Array, Array], tuple[int, ...]]
 """Tells, for a controller, the axes that leave where a point's flags have them, before and after."""
 
 
+class InFull(NamedTuple):
+    """How a place that a program counts from the point before is written once one of both moves."""
+
+    before: int
+    edits: tuple[tuple[int, int, str], ...]
+    """Pieces of the program's own text, and what stands there then: {0} is the first number."""
+
+
 class Point(NamedTuple):
     name: str  # as the program calls it; 'line 12' for one that stands in the move
     where: str  # file and line
@@ -37,6 +45,7 @@ class Point(NamedTuple):
     external: Array | None = None
     """External axes at a pose, as the first joints of the model, shape (m,); None where it does
     not say."""
+    in_full: InFull | None = None
 
 
 class Ref(NamedTuple):
@@ -97,6 +106,7 @@ class Program:
         notation: Notation,
         file: int = 0,
         external: Array | None = None,
+        in_full: InFull | None = None,
     ) -> int:
         """Add a point of one of the sources, with external axes at a pose; return its index."""
         where = self.sources[file].where(numbers[0].start)
@@ -104,7 +114,7 @@ class Program:
             value = notation.value([number.value for number in numbers])
         except DataError as error:
             raise DataError(f'{where}: {error}') from None
-        self.points.append(Point(name, where, tuple(numbers), notation, value, external))
+        self.points.append(Point(name, where, tuple(numbers), notation, value, external, in_full))
         return len(self.points) - 1
 
     def add(self, step: Step) -> None:
@@ -365,19 +375,23 @@ UNMOVED = 1e-9
 def rewritten(program: Program, points: Sequence[Array], moved: Collection[int]) -> list[str]:
     """Return the texts of the files with some points moved to the values of all points."""
     edits: list[tuple[int, int, int, str]] = []
+    other = {k for k in moved if np.abs(points[k] - program.points[k].value).max() >= UNMOVED}
     for k in sorted(moved):
         point = program.points[k]
-        if np.abs(points[k] - point.value).max() < UNMOVED:
+        if k not in other and (point.in_full is None or point.in_full.before not in other):
             continue
         old = [number.value for number in point.numbers]
         new = point.notation.numbers(points[k], old)
-        texts = program.sources
-        for place, (number, value) in enumerate(zip(point.numbers, new, strict=True)):
-            length, angle = point.notation.decimals
-            least = angle if point.notation.joints or place > 2 else length
-            written = texts[number.file].text[number.start : number.end]
-            text = numeral(value, written, least)
-            if abs(value - number.value) > 0.5 * 10.0 ** -max(least, _decimals(written)):
+        length, angle = point.notation.decimals
+        least = [angle if point.notation.joints or n > 2 else length for n in range(len(new))]
+        if point.in_full is not None:
+            full = [numeral(value, '', digits) for value, digits in zip(new, least, strict=True)]
+            edits += [(0, at, end, form.format(*full)) for at, end, form in point.in_full.edits]
+            continue
+        for number, value, digits in zip(point.numbers, new, least, strict=True):
+            written = program.sources[number.file].text[number.start : number.end]
+            text = numeral(value, written, digits)
+            if abs(value - number.value) > 0.5 * 10.0 ** -max(digits, _decimals(written)):
                 edits.append((number.file, number.start, number.end, text))
     out = [source.text for source in program.sources]
     for file, start, end, text in sorted(edits, reverse=True):

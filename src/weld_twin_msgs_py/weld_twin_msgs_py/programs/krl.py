@@ -3,15 +3,18 @@
 """
 KRL of KUKA: a ``.src`` with the moves and, beside it, a ``.dat`` with the points.
 
-PTP, LIN and CIRC, and their spline forms, to points that stand in the move or are declared. Lengths
-are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the signs of the axes. ``$BASE = EK(root,
-type, frame)`` is a base on the flange of an external kinematic system [2]_.
+PTP, LIN and CIRC, and their spline forms, to points that stand in the move or are declared; LIN_REL
+from a place that is known. Lengths are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the
+signs of the axes. ``$BASE = EK(root, type, frame)`` is a base on the flange of an external kinematic
+system [2]_.
 
 References
 ----------
 .. [1] KUKA's expert programming manual as quoted at robot-forum.com, thread 7173 (Status, Turn);
    "Status and Turn in LIN motions", industrialmonitordirect.com: linear moves do not use them.
 .. [2] robot-forum.com, thread 40359; posts of the Robots plug-in (visose/Robots, GitHub): EK.
+.. [3] "KUKA LIN_REL vs Geometric Operator: E-Stop Behavior", industrialmonitordirect.com: along the base
+   in force unless #TOOL stands there.
 
 """
 
@@ -22,13 +25,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.travel import Kind
 
-from .build import Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
+from .build import InFull, Program, Ref, Step, hold_if_used_elsewhere, signs_kept, turn_bits
 from .controllers import Context, Frame
-from .reader import LEAST_SPEED, Blocks, Frames, Reader, unclear, unclear_shift
+from .reader import LEAST_SPEED, Blocks, Frames, Reader, same_frame, unclear, unclear_shift
 from .source import KUKA_POSE, NUMBER, Number, Source, closing, number_at, split_outside, stripped
 
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
@@ -36,6 +40,13 @@ POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', '
 SPEED = 0.1
 """m/s while the program has not said."""
 _MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
+_COUNTED = re.compile(r'[ \t]*(\{[^\r\n]*\})(?:[ \t]*C_\w+)*[ \t]*(#(?:BASE|TOOL))?[ \t]*\Z', re.I)
+"""What LIN_REL adds to where the arm stands, and along which axes [3]_."""
+_IN_PLACE = re.compile(
+    r'[ \t]*(?:\$?\w[\w.\[\]]*[ \t]*=[^(]*|(?:WAIT|PULSE|TRIGGER|CONTINUE)\b.*|BAS[ \t]*\([ \t]*#.*|)\Z',
+    re.I,
+)
+"""A line in which no arm moves and no other line leads to."""
 _EXTERNAL = re.compile(
     r'\b(E[1-6])(?:[ \t]*=[ \t]*|[ \t]+)(?=\S)(?![-+]?0*\.?0*(?:[,}\s]|\Z))', re.I
 )
@@ -150,6 +161,8 @@ class KrlReader(Reader):
             self.program, tool=unclear('$TOOL'), base=unclear('$BASE'), shift=unclear_shift
         )
         self.spline = ''
+        self.reached = 0
+        """Where the statement of the last move ends."""
         self.shared: list[str] = []
         """Points that other programs see, too."""
 
@@ -409,8 +422,11 @@ class KrlReader(Reader):
         word, kind = result[1].upper(), KINDS[result[1].upper()]
         text = self.text
         end = _line_end(text, result.end())
+        since, self.reached = self.text[self.reached : result.start()], end
         if result[2]:
-            self.unknown(kind, result, f'{word}_REL counts from where the arm stands')
+            why = 'which is not known here' if kind != 'linear' else self._counted(result, since)
+            if why:
+                self.unknown(kind, result, f'{word}_REL counts from where the arm stands, {why}')
             return
         wanted = 2 if kind == 'circular' else 1
         with_ = _WITH.search(text, result.end(), end)
@@ -440,6 +456,51 @@ class KrlReader(Reader):
             return
         frames = self._own_frames(self.spline, text[cut:end].upper())
         self.program.add(self._step(kind, self.where(result), ends, frames, tail))
+
+    def _counted(self, result: re.Match[str], since: str) -> str:
+        """Add a straight move that counts from the place before, or return why that is not known."""
+        what = _COUNTED.match(self.text, result.end(), self.reached)
+        content = what and self._aggregate(0, *what.span(1))
+        if what is None or content is None or content.others or self.context.controller.external:
+            return 'by what is worked out, or with external axes'
+        way = {key: number.value for key, number in content.numbers.items()}
+        if any(value and key not in 'XYZ' for key, value in way.items()):
+            return 'and turns the tool or moves external axes'
+        before, frames = self.program.pieces[-1][-1:], self._own_frames(self.spline)
+        if not all(map(_IN_PLACE.match, since.splitlines())) or not before or not before[0].end:
+            return 'and what comes before it may lead there from elsewhere'
+        kept = (before[0].tool, before[0].base, before[0].shift)
+        old = self.program.points[before[0].end.point]
+        if old.value.ndim == 1 or not all(map(same_frame, kept, frames)):
+            return 'which the move before does not say in this tool and base'
+        axes = old.value[:3, :3] if (what[2] or '').upper() == '#TOOL' else np.eye(3)
+        step = axes @ [1e-3 * way.get(key, 0.0) for key in 'XYZ']
+        pose = transform(old.value[:3, :3], old.value[:3, 3] + step)
+        numbers = KUKA_POSE.numbers(pose, [number.value for number in old.numbers])
+        start = result.start(1)
+        point = self.program.add_point(
+            f'line {self.source.line(start)}',
+            [Number(value, start, start) for value in numbers],
+            KUKA_POSE,
+            external=self.context.external(()),
+            in_full=InFull(before[0].end.point, self._in_full(result, what)),
+        )
+        self.program.stands_beside(point, [])
+        tail = self.text[what.end(1) : self.reached].upper()
+        self.program.add(self._step('linear', self.where(result), [point], frames, tail))
+        return ''
+
+    def _in_full(
+        self, result: re.Match[str], what: re.Match[str]
+    ) -> tuple[tuple[int, int, str], ...]:
+        """Return how LIN_REL and what it adds become LIN to a place, with a remark of what it was."""
+        numbers = ','.join(f'{key} {{{k}}}' for k, key in enumerate(POSE_KEYS))
+        said = self.source.text[result.start(1) : max(what.span(1)[1], what.end(2))].strip()
+        close = _line_end(self.source.text, self.reached)
+        remark = f' ; was {said}'.replace('{', '{{').replace('}', '}}')
+        axes = [] if what[2] is None else [(*what.span(2), '')]
+        full = (result.start(2), what.end(1), f' {{{{{numbers}}}}}')
+        return (full, *axes, (close, close, remark))
 
     def _own_frames(self, *settings: str) -> Frames:
         """Return tool, base and shift of a move, settings of its block and its own counted."""

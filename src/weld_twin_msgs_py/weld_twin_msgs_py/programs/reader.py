@@ -366,7 +366,7 @@ class Blocks:
         ways = [*block.ends, now] if block.word in _REST else [block.head, *block.ends, now]
         after = []
         for k, (name, unclear) in enumerate(self._unclear.items()):
-            alike = all(_same(way[k], ways[0][k]) for way in ways)
+            alike = all(same_frame(way[k], ways[0][k]) for way in ways)
             after.append(ways[0][k] if alike else unclear(block.where))
             if block.loop and not alike:
                 # Moves of its first round have what a later round finds otherwise.
@@ -389,7 +389,8 @@ def unclear_shift(where: str) -> Frame:
     )
 
 
-def _same(one: Frame, other: Frame) -> bool:
+def same_frame(one: Frame, other: Frame) -> bool:
+    """Return whether two frames are one."""
     if (one.name, one.moving, one.why) != (other.name, other.moving, other.why):
         return False
     if one.value is None or other.value is None:

@@ -68,6 +68,10 @@ FRAMES_FITTED = (
     'upper end of what is expected is for points that are given in the base of the robot; near the '
     'lower end only come points that were taught with this arm, where it was recorded'
 )
+IN_FULL = (
+    'what counts from the point before ({places}) is written in full where its seam is corrected, with '
+    'a remark of what it was: it goes along with that point no more'
+)
 NOT_SURE = (
     'how sure the correction is is not known: the model has no posterior, only a diagnosis.json '
     'written by this version has'
@@ -180,6 +184,8 @@ def _read_back(
 
 def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]:
     out = [*program.notes, *context.controller.notes, *_unused(program, context)]
+    if places := [point.where for point in program.points if point.in_full]:
+        out.append(IN_FULL.format(places=', '.join(places)))
     if CORRECTED in context.robot.source:
         out.append(CORRECTED_ROBOT)
     tools = [

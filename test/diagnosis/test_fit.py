@@ -197,3 +197,15 @@ def test_what_a_fit_leaves_is_foretold_without_the_effects_that_were_taken_out_o
     unseen = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
     assert unseen.parts == ()
     assert unseen.whole.shape == found.residual.shape
+
+
+@pytest.mark.parametrize('warming_time', [2.0, 20.0])
+def test_a_size_given_to_one_error_does_not_throw_off_the_time_constant_of_another(warming_time):
+    warm = effect('joint_warm_up', joint='elbow_joint', offset=3e-4, warming_time=warming_time)
+    zero = effect('joint_offset', joint='shoulder_lift_joint', offset=8e-4)
+    problem, model = tiny((warm, zero), align=('base', 'tool'))
+    scale = known_scale(problem)
+    true = fit(problem, model.with_found((warm, zero)), scale)
+    alone = fit(problem, model.with_found((warm,)), scale).model  # its frames make up for the zero
+    beside = fit(problem, alone.with_found((*alone.found, zero)), scale)
+    assert beside.rss == pytest.approx(true.rss, rel=0.05)

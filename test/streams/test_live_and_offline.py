@@ -41,6 +41,7 @@ EXAMPLES = {
     **{name: {**TURN, 'time': 0.4} for name in ('setup_step', 'instrument_knock', 'tool_slip')},
     'joint_slip': {**ELBOW, 'offset': 1e-3, 'time': 0.4},
     'link_warm_up': {**ELBOW, 'strain': 1e-3, 'warming_time': 0.4},
+    'joint_warm_up': {**ELBOW, 'offset': 1e-3, 'warming_time': 0.4},
     'thermal_growth': {'coefficient': 1.2e-5},
     'transmission_ripple': {**ELBOW, 'amplitude': 1e-3, 'order': 100.0, 'phase': 0.3},
     'tool_sag': {'sag': [1e-4 * k for k in range(9)]},

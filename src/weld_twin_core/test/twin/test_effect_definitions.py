@@ -252,6 +252,11 @@ def link_warm_up(cell):
         cell.table[key, 2] = 1e-3 * warmth * getattr(cell.robot, key)[2]
 
 
+@defines(joint='j2', offset=1e-3, warming_time=2.0)
+def joint_warm_up(cell):
+    cell.q[2] += 1e-3 * (1.0 - np.exp(-cell.elapsed / 2.0))
+
+
 @defines(xyz_rate=SMALL)
 def drift(cell):
     def move(pose):

@@ -32,6 +32,7 @@ ENTRIES = {
     'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},
     'servo_lag': {'joint': 'j3', 'time_constant': 0.01},
     'link_warm_up': {'joint': 'j2', 'strain': 1e-3, 'warming_time': 20.0},
+    'joint_warm_up': {'joint': 'j2', 'offset': 1e-3, 'warming_time': 20.0},
     'vibration': {'joint': 'j2', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.3},
     'hose_pull': {'force': [10.0, -20.0, 30.0], 'stiffness': 40.0},
     'axis_compliance': {'joint': 'j3', 'compliance': 2e-6},

@@ -43,7 +43,7 @@ from .quantization import Quantization
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
 from .rubbing import Friction, Hysteresis
 from .servo_lag import ServoLag, Vibration
-from .thermal import LinkWarmUp, ThermalGrowth
+from .thermal import JointWarmUp, LinkWarmUp, ThermalGrowth
 from .transmission_ripple import TransmissionRipple
 from .view import Parameter, Plausible, Stage, View
 from .wear import Wear
@@ -53,9 +53,17 @@ __all__ += ['CartesianCompliance', 'ClockRate', 'Drift', 'Effect', 'FrameCurve',
 __all__ += ['GearRatio', 'GearRatioByDirection', 'GuideBend', 'GuideTilt', 'HosePull']
 __all__ += ['Hysteresis', 'InstrumentKnock', 'JointCompliance', 'JointCoupling', 'JointCurve']
 __all__ += ['JointOffset', 'JointSlip', 'LinearEffect', 'LinkLength', 'LinkOffset', 'LinkTwist']
-__all__ += ['LinkWarmUp', 'LoadedPlay', 'MeasurementNoise', 'MeasurementScale', 'MemoryEffect']
-__all__ += ['Parameter', 'Payload', 'PedestalTilt', 'Plausible', 'Quantization', 'Refraction']
-__all__ += ['RootPose', 'ServoLag', 'SetupSettling', 'SetupStep', 'Stage', 'Stiffening']
+__all__ += ['JointWarmUp', 'LinkWarmUp', 'LoadedPlay', 'MeasurementNoise', 'MeasurementScale']
+__all__ += ['MemoryEffect', 'Parameter', 'Payload', 'PedestalTilt', 'Plausible', 'Quantization']
+__all__ += [
+    'Refraction',
+    'RootPose',
+    'ServoLag',
+    'SetupSettling',
+    'SetupStep',
+    'Stage',
+    'Stiffening',
+]
 __all__ += ['ThermalGrowth', 'TimeDelay', 'ToolPose', 'ToolSag', 'ToolSlip', 'TransmissionRipple']
 __all__ += ['Vibration', 'View', 'Wear', 'effect_from_mapping', 'effects_from_list', 'register']
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
@@ -243,6 +244,11 @@ class FitHooks(_Hooks):
         for k, value in zip(self.fitted(), values, strict=True):
             vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
         return self.effect.with_vector(vector)
+
+    def straight(self) -> NDArray[np.bool_]:
+        """Return in which fit coordinates the displacement is a straight line, shape (K,)."""
+        specs = self.effect.components()
+        return np.array([specs[k][0].linear for k in self.fitted()], dtype=bool)
 
     def coordinate_scales(self) -> Array:
         """Return the typical size of every fit coordinate, shape (K,)."""

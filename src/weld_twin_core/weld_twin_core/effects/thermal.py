@@ -1,25 +1,28 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Links that grow: all of them with temperature, or one as it warms up.
+What moves with heat: links that grow, all of them or one as it warms up, and a joint's zero.
 
-Thermal growth is a, d -> (1 + coefficient dT) a, d, with dT measured or a warm-up curve. Warm-up of one
-link is a, d -> (1 + strain w) a, d with w = 1 - exp(-t / warming_time): a motor heats the link that it
-sits in, from the recording's first stamp on. Where a temperature was recorded, w may follow it instead:
-(temperature - at) / rise.
+Thermal growth is a, d -> (1 + coefficient dT) a, d, with dT measured or a warm-up curve. A motor heats
+the link that it sits in, and its gear: with w = 1 - exp(-t / warming_time), from the recording's first
+stamp on, warm-up of one link is a, d -> (1 + strain w) a, d, of one joint theta -> theta + offset w.
+Where a temperature was recorded, w may follow it instead: (temperature - at) / rise.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
 from ..errors import DataError, ModelError
 from .effect import Effect, FitHooks, Hooked, LinearEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
-from .wording import number
+from .wording import number, radians
 
 
 @register
@@ -124,55 +127,45 @@ _NUMBERED = 1e-6
 
 
 class _Fit(FitHooks):
-    effect: LinkWarmUp
+    effect: _WarmUp
 
     def fitted(self) -> list[int]:
         return [0, 1] if self.effect.follows is None else [0]
 
 
-@register
-class LinkWarmUp(Effect):
-    """One link grows by ``strain`` of its lengths; ``follows``: [temperature degC, rise K]."""
+_WARMING_TIME = Parameter(
+    'warming_time', 's', typical=60.0, lower=0.1, linear=False, idealised=0.1
+).plausible(
+    (np.inf, 1.0, 2e4),
+    'derived: no metal warms within a second; beyond five hours it is the hall',
+)
+
+
+class _WarmUp(Effect):
+    """
+    One joint or link moves by its first parameter as it warms up; see the head of this file.
+
+    ``follows``: [temperature degC, rise K].
+    """
 
     joint: str
-    strain: Value = 0.0
-    warming_time: Value = 60.0
-    follows: Sequence[float] | None = None
+    warming_time: Value
+    follows: Sequence[float] | None
 
-    traits = Traits(
-        title='warm-up of the link',
-        meaning='one link grows as it warms up',
-        formula='a, d → (1 + strain w) a, d of one row, w = 1 − exp(−t / warming_time) since '
-        'the first stamp; with `follows: [at, rise]` w = (temperature − at) / rise',
-        entered='warming up',
-        depends_on='time',
-        common=False,
-    )
-    of = 'link'
-    stage = Stage.LINK
-    parameters = (
-        Parameter('strain', '-', typical=1e-4, idealised=0.05).plausible(
-            (2.4e-4, -2.4e-4, 1.2e-3),
-            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range '
-            'derived: beside its motor a link gets 50 K warmer than it was, or 10 K cooler '
-            'where a fan blows',
-        ),
-        Parameter(
-            'warming_time', 's', typical=60.0, lower=0.1, linear=False, idealised=0.1
-        ).plausible(
-            (np.inf, 1.0, 2e4),
-            'derived: no metal warms within a second; beyond five hours it is the hall',
-        ),
-    )
+    traits = Traits(entered='warming up', depends_on='time', common=False)
     options = ('follows',)
     needs = frozenset({'time'})
     fit = Hooked(_Fit)
+
+    @abstractmethod
+    def _moved(self, view: View, size: Array) -> Shift:
+        """Return what a size of the first parameter moves, shape (N,)."""
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
         if self.follows is not None and not (_is_pair(self.follows) and self.follows[1] != 0.0):
             raise ModelError(
-                'link_warm_up: follows must be [temperature in degC, rise in K, not zero], got '
+                f'{self.name}: follows must be [temperature in degC, rise in K, not zero], got '
                 f'{self.follows!r}'
             )
 
@@ -181,32 +174,27 @@ class LinkWarmUp(Effect):
         return 'time' if self.follows is None else 'temperature'
 
     def _warmth(self, view: View) -> Array:
-        """Return how warm the link is, 1 at the end, shape (N,)."""
+        """Return how warm it is, 1 at the end, shape (N,)."""
         if self.follows is None:
             return -np.expm1(-view.elapsed / self.number('warming_time'))
         if view.temperature is None:
-            raise DataError('link_warm_up follows a temperature: record /temperature')
+            raise DataError(f'{self.name} follows a temperature: record /temperature')
         return np.asarray((view.temperature - self.follows[0]) / self.follows[1])
 
-    def _grown(self, view: View, strain: Array) -> Shift:
-        return _grown(view.robot, [view.robot.index(self.joint)], strain)
-
     def displace(self, view: View) -> Shift:
-        """Return the growth of the link's lengths; travel of a joint that slides does not grow."""
-        return self._grown(view, self.number('strain') * self._warmth(view))
+        size = self.number(self.parameters[0].name)
+        return self._moved(view, size * self._warmth(view))
 
     def gradient(self, view: View) -> list[Shift | None]:
         slow = np.zeros_like(view.elapsed)
         if self.follows is None:
             constant = self.number('warming_time')
             slow = -view.elapsed / constant**2 * np.exp(-view.elapsed / constant)
-        return [
-            self._grown(view, self._warmth(view)),
-            self._grown(view, self.number('strain') * slow),
-        ]
+        size = self.number(self.parameters[0].name)
+        return [self._moved(view, self._warmth(view)), self._moved(view, size * slow)]
 
     def atoms(self, view: View) -> list[Shift]:
-        return [self._grown(view, self._warmth(view))]
+        return [self._moved(view, self._warmth(view))]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
@@ -218,20 +206,101 @@ class LinkWarmUp(Effect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
-        i = view.robot.index(str(joint))
-        if view.robot.a[i] == 0.0 and view.robot.d[i] == 0.0:
-            return
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
+        kind: Any = cls  # whose first fields are joint, size and time constant
         for share in _CONSTANTS:
-            yield cls(str(joint), 0.0, share * span)
+            yield kind(str(joint), 0.0, share * span)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
-            yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
+            yield kind(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
+
+
+@register
+class LinkWarmUp(_WarmUp):
+    """One link grows by ``strain`` of its lengths as it warms up."""
+
+    joint: str
+    strain: Value = 0.0
+    warming_time: Value = 60.0
+    follows: Sequence[float] | None = None
+
+    traits = replace(
+        _WarmUp.traits,
+        title='warm-up of the link',
+        meaning='one link grows as it warms up',
+        formula='a, d → (1 + strain w) a, d of one row, w = 1 − exp(−t / warming_time) since '
+        'the first stamp; with `follows: [at, rise]` w = (temperature − at) / rise',
+    )
+    of = 'link'
+    stage = Stage.LINK
+    parameters = (
+        Parameter('strain', '-', typical=1e-4, idealised=0.05).plausible(
+            (2.4e-4, -2.4e-4, 1.2e-3),
+            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range '
+            'derived: beside its motor a link gets 50 K warmer than it was, or 10 K cooler '
+            'where a fan blows',
+        ),
+        _WARMING_TIME,
+    )
+
+    def _moved(self, view: View, size: Array) -> Shift:
+        """Return the growth of the link's lengths; travel of a joint that slides does not grow."""
+        return _grown(view.robot, [view.robot.index(self.joint)], size)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield warm-ups of a link that has a length."""
+        i = view.robot.index(str(joint))
+        if view.robot.a[i] != 0.0 or view.robot.d[i] != 0.0:
+            yield from super().seeds(view, joint, pull)
 
     def remedy(self, robot: Robot) -> str:
         grown = self._plain('strain') * 1e3
         return (
             f'Warm {self.site} up before welding, or compensate its link while it warms: it grows by '
             f'{number(grown)} mm per m.'
+        )
+
+
+@register
+class JointWarmUp(_WarmUp):
+    """One joint stands ``offset`` further than its reading once it is warm."""
+
+    joint: str
+    offset: Value = 0.0
+    warming_time: Value = 60.0
+    follows: Sequence[float] | None = None
+
+    traits = replace(
+        _WarmUp.traits,
+        title='warm-up of the joint',
+        meaning="a joint's zero moves as its gear warms up",
+        formula='θ → θ + offset w, w as of `link_warm_up`',
+    )
+    of = 'joint'
+    stage = Stage.JOINT
+    parameters = (
+        Parameter('offset', 'rad', typical=1e-4, idealised=0.05)
+        .plausible(
+            (5e-4, 5e-3),
+            'derived: a housing of 0.1 m that grows aside of its axis by 50 µm'
+            ' where it gets 20 K warmer than its other side; ten times as much is a loose part',
+        )
+        .plausible_sliding(
+            (1e-4, 2e-3), 'derived: a screw of steel of 1 m that gets 10 K warmer grows by 0.1 mm'
+        ),
+        _WARMING_TIME,
+    )
+
+    def _moved(self, view: View, size: Array) -> Shift:
+        return {('q', view.robot.index(self.joint)): size}
+
+    def remedy(self, robot: Robot) -> str:
+        at = robot.index(str(self.site))
+        size = self._plain('offset')
+        far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
+        return (
+            f'Warm {self.site} up before welding, or compensate its zero while it warms: it moves by '
+            f'{far}.'
         )
 
 

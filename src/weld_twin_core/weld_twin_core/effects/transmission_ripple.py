@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ModelError
 from .backlash import RV
@@ -93,6 +94,9 @@ class _Fit(FitHooks):
 
     def with_coordinates(self, values: Array) -> TransmissionRipple:
         return self.effect.from_atoms(values)
+
+    def straight(self) -> NDArray[np.bool_]:
+        return np.ones(self.coordinates().size, dtype=bool)
 
     def coordinate_shifts(self, view: View) -> list[Shift]:
         return self.effect.atoms(view)

@@ -234,8 +234,8 @@ class Posterior:
                 # Waves of a joint add up: those found stay as they are, beside what is missing.
                 effects.append(effect.fit.with_coordinates(step[here]))
                 continue
-            straight = [effect.components()[k][0].linear for k in effect.fit.fitted()]
-            moved = effect.fit.with_coordinates(now + np.where(straight, step[here], 0.0))
+            straight = np.where(effect.fit.straight(), step[here], 0.0)
+            moved = effect.fit.with_coordinates(now + straight)
             step[here] = moved.fit.coordinates() - now
             effects.append(moved)
         step[self.directions.frame_count + sum(self.directions.sizes) :] = 0.0

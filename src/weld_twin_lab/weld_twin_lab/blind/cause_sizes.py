@@ -173,7 +173,12 @@ def _compliance(here: Here) -> Cause:
 def _warm_up(here: Here) -> Cause:
     long = np.flatnonzero(np.hypot(here.robot.a, here.robot.d) > LONG)
     joint = here.robot.joint_names[int(here.rng.choice(long))]
-    return {'joint': joint, 'strain': 3e-4, 'warming_time': here.span * here.between(0.2, 0.8)}
+    return {'joint': joint, 'strain': 3e-4, 'warming_time': _slow(here)}
+
+
+def _slow(here: Here) -> float:
+    """Return a time constant that shows within the motion [s]."""
+    return here.span * here.between(0.2, 0.8)
 
 
 def _knock(here: Here) -> Cause:
@@ -278,6 +283,7 @@ CAUSES: dict[str, Typical] = {
     'gear_ratio_by_direction': _one('difference', 1e-3, signed=True),
     'clock_rate': _whole('rate', 2e-5, signed=True, moving=True),
     'link_warm_up': Typical(_warm_up, ('strain',), moving=True),
+    'joint_warm_up': _one('offset', 4e-4, signed=True, moving=True).beside(warming_time=_slow),
 }
 NEW = sorted((known() & set(REGISTRY)) - set(CAUSES) - {'measurement_noise'})
 """Effects that plant and library have, and that nothing is said of here: as they say themselves."""

@@ -254,6 +254,12 @@ def flaw(part: str) -> Callable[[F], F]:
     return keep
 
 
+@flaw('joint')
+def joint_warm_up(entry: Entry, here: Here) -> np.ndarray:
+    """Return how far the heat of its gear has turned a joint."""
+    return float(entry['offset']) * heated(here.t, float(entry['warming_time']))
+
+
 @cache
 def known() -> frozenset[str]:
     """Return the names of all flaws that an effects file may have."""

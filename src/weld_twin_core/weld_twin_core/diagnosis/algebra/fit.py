@@ -148,6 +148,7 @@ def fit(
     prior = effect_precision(model) if precision is None else precision
     start = _Point.at(problem, model, scale, prior)
     columns = start.columns()
+    start = _levelled(start, columns)
     here = _descended(start, columns, iterations, tolerance, most)
     if problem.at_rest and here.believed > STRAINED and scale.position > LEAST_NOISE:
         # What a cause that is not fitted yet leaves was taken for noise, beside which few stations
@@ -165,6 +166,23 @@ def predict_fit(
     start = _Point.at(problem, model, scale, effect_precision(model))
     normal, right = start.normal_equations(columns)
     return start.residual, start.cost - float(right @ solve_scaled(normal, right, DAMPING))
+
+
+def _levelled(start: _Point, columns: Columns) -> _Point:
+    """
+    Return the start with frames and sizes that belong together, all that bends it held.
+
+    An effect more starts as large as it is best with all others fitted anew. Beside the others as
+    they were it makes all of it worse, and a frequency or a time constant would leap to make up for it.
+    """
+    bent = ~np.concatenate([[True], *(effect.fit.straight() for effect in start.model.found)])[1:]
+    if not bent.any():
+        return start
+    held = np.concatenate([np.zeros(start.x.size - bent.size, dtype=bool), bent])
+    normal, right = start.normal_equations(columns)
+    normal[held], normal[:, held], right[held] = 0.0, 0.0, 0.0
+    there = start.stepped(solve_scaled(normal, right, DAMPING))
+    return there if there.cost < start.cost else start
 
 
 def _descended(

@@ -84,10 +84,7 @@ def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
     dense = {(e.name, e.site) for e in result if e.search.orders().size > ORDERS.size}
     out = [np.zeros(0)]
     for effect in effects:
-        if effect.traits.waves is not None:
-            straight = [(effect.name, effect.site) not in dense] * effect.fit.coordinates().size
-        else:
-            straight = [effect.components()[j][0].linear for j in effect.fit.fitted()]
+        straight = effect.fit.straight() & ((effect.name, effect.site) not in dense)
         out.append(np.where(straight, -effect.fit.coordinates(), 0.0))
     return np.concatenate(out)
 

@@ -171,6 +171,11 @@ def test_files_live_twin_and_programs_have_what_slipped_as_it_is_since(tmp_path)
     assert_same_tool(live, since)
     (said,) = left_behind(read_diagnosis(file), live.effects)
     assert 'drift of the frame grew with the time' in said
+    # One that is given for today does not stand for the one that was recorded.
+    today = build_twin(NOMINAL, file, '[{effect: drift, xyz_rate: [0.0, 2.0e-6, 0.0]}]')
+    assert today.effects[-1].name == 'drift'
+    assert left_behind(read_diagnosis(file), today.effects) == [said]
+    assert left_behind(read_diagnosis(file), found) == []
     robot = read_robot_yaml(tmp_path / 'robot.yaml')
     left = read_effects(tmp_path / 'robot_effects.yaml', robot)
     assert_same_tool(Twin(robot, from_now_on(left)), since)

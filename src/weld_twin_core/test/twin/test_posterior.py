@@ -213,8 +213,7 @@ def test_effects_at_the_middle_move_the_tool_as_far_as_the_models_in_the_middle_
     own = [3e-5, -2e-5, 1e-5, 2e-5, -1e-5, 3e-5]
     mean = np.concatenate([np.linspace(-4e-5, 4e-5, what.frame_count), own])
     known = replace(known, mean=mean, middle=0.5)
-    effects, rest = known.centred(found)
-    effects = (*effects, *known.moved_frames(1))
+    effects, rest = known.centred(found, 1)
     np.testing.assert_allclose(rest.mean, 0.5 * mean, rtol=1e-9)
     assert found[2] in effects
     still = Recording('m', JointMotion(np.arange(7.0), np.linspace(-1.0, 1.0, 42).reshape(7, 6)))
@@ -282,6 +281,15 @@ def test_a_motion_to_come_is_not_late_by_the_clock_of_the_instrument():
     told = late.of_the_arm().pose_covariance(seen)
     np.testing.assert_allclose(told, bare.pose_covariance(seen), rtol=1e-9, atol=1e-18)
     assert np.trace(late.pose_covariance(seen)[0, :3, :3]) > 100.0 * np.trace(told[0, :3, :3])
+
+
+def test_a_tip_that_wore_while_it_was_recorded_does_not_wear_on_in_a_program():
+    robot = load('ur5')
+    zero, wear = REGISTRY['joint_offset'](robot.joint_names[1], 1e-3), REGISTRY['wear'](2e-6)
+    what = Directions((), 1, (zero, wear))
+    known = replace(posterior(robot, what, np.diag([1e-10, 1e-12, 1e-8])), middle=1.0)
+    effects, _ = known.of_the_arm().centred((zero,), 0)
+    assert [effect.name for effect in effects] == ['joint_offset']
 
 
 def test_what_may_be_the_arms_instead_of_the_instruments_is_no_less_the_arms():

@@ -25,7 +25,7 @@ from scipy.special import ndtri
 
 from ..arm.robot import Robot
 from ..arrays import Array, halton, readonly
-from ..effects.dated import of_the_robot
+from ..effects.dated import from_now_on
 from ..effects.effect import Effect
 from ..effects.geometry import BasePose, FrameError, ToolPose
 from ..errors import DataError, ModelError
@@ -193,34 +193,39 @@ class Posterior:
         """
         Return how sure the tool's own poses are on a motion to come, which nobody measures.
 
-        What was found of the instrument, its clock and the set-up stays with the recording, and what
-        slipped is as it was after that (`of_the_robot`). The
+        What was found of the instrument, its clock and the set-up stays with the recording, and so does
+        what grew while it lasted; what slipped is as it was after that (`from_now_on`). The
         middle of the allowed models may hold less of it than the fit, and more of the arm in its
         place: counted together, the two would cancel.
         """
         what = self.directions
-        stays = [commandable(effect) for effect in what.effects]
+        stays = [commandable(effect) and bool(from_now_on([effect])) for effect in what.effects]
         own = np.repeat(stays, what.sizes).astype(bool)
         keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(what.shapes, bool)])
         effects = (e for e, stay in zip(what.effects, stays, strict=True) if stay)
         return replace(
             self,
-            directions=replace(what, effects=of_the_robot(tuple(effects))),
+            directions=replace(what, effects=from_now_on(tuple(effects))),
             mean=self.mean[keep],
             covariance=self.covariance[np.ix_(keep, keep)],
             prior_std=None if self.prior_std is None else self.prior_std[keep],
             single=None,
         )
 
-    def centred(self, result: Sequence[Effect]) -> tuple[tuple[Effect, ...], Posterior]:
+    def centred(
+        self, result: Sequence[Effect], setup: int | None = None
+    ) -> tuple[tuple[Effect, ...], Posterior]:
         """
         Return the effects that predict best, and the posterior about them.
 
         What a diagnosis names is a few effects; most arms have a little of all others, and what the
-        recordings say of these is kept here. Frames go along. A parameter that bends the twin, what a
+        recordings say of these is kept here. A parameter that bends the twin, what a
         joint gives when it is accelerated, and the height of a curve, stay.
 
         result: of the fitted model.
+        setup: whose fitted frames are taken as the middle of the allowed models has them, by effects of
+        base and tool: a base that turns and an error of the arm that turns it back hardly show, and
+        whoever takes the error for true has to take the turn, too.
         """
         if self.middle == 0.0:
             return tuple(result), self
@@ -242,15 +247,11 @@ class Posterior:
         others = [effect for effect in result if effect.key not in ours and effect not in waves]
         what = replace(self.directions, effects=tuple(effects))
         centred = replace(self, directions=what, mean=self.mean - step, single=None, middle=0.0)
-        return (*effects, *waves, *others), centred
+        frames = () if setup is None else self._moved_frames(setup)
+        return (*effects, *waves, *others, *frames), centred
 
-    def moved_frames(self, setup: int = 0) -> tuple[Effect, ...]:
-        """
-        Return how far the middle of the allowed models has fitted frames from where the fit has them.
-
-        A base that turns and an error of the arm that turns it back hardly show; whoever takes the
-        error for true has to take the turn, too.
-        """
+    def _moved_frames(self, setup: int) -> tuple[Effect, ...]:
+        """Return how far the middle of the allowed models has fitted frames from the fit."""
         step, what = self.middle * self.mean, self.directions
         at = {'base': 6 * setup, 'tool': what.frame_count - 6}
         kinds: dict[str, type[FrameError]] = {'base': BasePose, 'tool': ToolPose}

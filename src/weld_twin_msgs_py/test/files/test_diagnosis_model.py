@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import ModelError
-from weld_twin_msgs_py.files.diagnosis_model import read_model
+from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis, read_model
 
 ELBOW = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
 NAMED = {**ELBOW, 'parameters': {'offset': 2e-3}, 'std': {'offset': 1e-5}}
@@ -39,3 +39,25 @@ def test_a_verdict_that_is_not_what_the_model_has_is_refused(tmp_path, effects):
     with pytest.raises(ModelError, match='effects was changed by hand') as told:
         read_model(robot, file)
     assert str(file) in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ('key', 'value', 'said'),
+    [
+        ('verdict', [], 'verdict needs a mapping, and has []'),
+        ('verdict', {'indistinguishable': [None]}, 'verdict.indistinguishable[0] needs a list'),
+        ('verdict', {'indistinguishable': [[{}]]}, 'indistinguishable[0][0].effect needs a text'),
+        ('verdict', {'effects': [{'effect': 'wear'}]}, 'effects[0].parameters needs a mapping'),
+        ('verdict', {'sure': 1}, 'verdict.sure needs true or false, and has 1'),
+        ('gap', {'rms_m': True}, 'gap.rms_m needs a number, and has true'),
+        ('unsound', [None], 'unsound[0] needs a mapping, and has null'),
+        ('model', {'epochs_ns': [0.5]}, 'model.epochs_ns[0] needs a whole number, and has 0.5'),
+        ('inputs', [{'use': 'robot', 'path': 'a' * 99}], 'inputs[0].sha256 needs a text'),
+    ],
+)
+def test_a_value_of_another_type_is_refused_where_the_file_is_read(tmp_path, key, value, said):
+    file = tmp_path / 'diagnosis.json'
+    file.write_text(json.dumps({'schema': 'weld_twin/diagnosis/2', key: value}))
+    with pytest.raises(ModelError, match='take the file as weld-twin diagnose wrote it') as told:
+        read_diagnosis(file)
+    assert said in str(told.value) and str(file) in str(told.value)

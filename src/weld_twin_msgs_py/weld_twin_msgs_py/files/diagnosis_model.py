@@ -24,11 +24,40 @@ from .yaml_file import whole
 
 SCHEMAS = tuple(f'weld_twin/diagnosis/{version}' for version in (1, 2))
 """Versions that are read."""
-_DICTS, _LISTS = ('model', 'verdict', 'posterior', 'gap', 'shrink'), ('unsound', 'inputs')
-PARTS = {**dict.fromkeys(_DICTS, dict), **dict.fromkeys(_LISTS, list)}
-"""What parts of a diagnosis are; each may be missing, or null."""
-INPUT = {'use', 'path', 'sha256'}
-"""Keys of each of the inputs."""
+_SITE = {'effect!': str, 'joint': str}
+SHAPE: dict[str, Any] = {
+    'gap': {'rms_m': float, 'noise_floor_m': float},
+    'verdict': {
+        'status': str,
+        'effects': [{**_SITE, 'parameters!': dict, 'std': dict}],
+        'confidence': float,
+        'sure': bool,
+        'indistinguishable': [[_SITE]],
+        'same_on_any_motion': [[_SITE]],
+        'causes': [{'effect': int}],
+    },
+    'shrink': {'rms_before_m': float, 'rms_after_m': float},
+    'unexplained': {'rms_m': float},
+    'unsound': [{'sentence': str, 'remedy': str, 'applied': bool, 'mend': dict}],
+    'model': {
+        'robot': str,
+        'kinematics': str,
+        'epochs_ns': [int],
+        'spans_ns': [[int]],
+        'known': [{'effect!': str}],
+        'found': [{'effect!': str}],
+        'alone': dict,
+        'counted': dict,
+    },
+    'changed': [dict],
+    'posterior': dict,
+    'inputs': [{'use!': str, 'path!': str, 'sha256!': str}],
+}
+"""
+Types of what is read of a diagnosis, whoever reads it: a list has any number of what it holds, a
+mapping has its keys with a mark; all other keys may be missing, or null.
+"""
+_CALLED = {float: 'a number', int: 'a whole number', str: 'a text', bool: 'true or false'}
 SIZE_LIMIT = 64_000_000
 """Bytes; a diagnosis of thousands of stations is some hundred kilobytes."""
 
@@ -53,26 +82,48 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
             f"'{path}' is no diagnosis of this version: its schema is {schema!r}, known are "
             f'{" and ".join(SCHEMAS)}; give the diagnosis.json that weld-twin diagnose wrote'
         )
-    for part in PARTS:
-        if not _means_something(part, data.get(part)):
-            raise ModelError(f"diagnosis '{path}': {part} was changed and means nothing any more")
+    if wrong := _misshapen(data, SHAPE):
+        raise ModelError(
+            f"diagnosis '{path}' was changed: {wrong}; take the file as weld-twin diagnose wrote it"
+        )
     return data
 
 
-def _means_something(part: str, item: Any) -> bool:
-    if part == 'inputs' and isinstance(item, list):
-        return all(isinstance(each, dict) and each.keys() >= INPUT for each in item)
-    return isinstance(item, PARTS[part] | type(None))
+def _misshapen(item: Any, shape: Any, name: str = '') -> str:
+    """Return what is not of the type that it needs, and where; empty where all is."""
+    kind = shape if isinstance(shape, type) else type(shape)
+    fits = isinstance(item, (float, int) if kind is float else kind)
+    if not fits or (isinstance(item, bool) and kind is not bool):
+        needs = _CALLED.get(kind, 'a list' if kind is list else 'a mapping')
+        return f'{name} needs {needs}, and has {_short(item)}'
+    if isinstance(shape, list):
+        each = ((item[k], shape[0], f'{name}[{k}]') for k in range(len(item)))
+    elif isinstance(shape, dict):
+        named = ((key.rstrip('!'), key[-1] == '!', inner) for key, inner in shape.items())
+        each = (
+            (item.get(key), inner, f'{name}.{key}'.lstrip('.'))
+            for key, must, inner in named
+            if must or item.get(key) is not None
+        )
+    else:
+        return ''
+    return next(filter(None, (_misshapen(*one) for one in each)), '')
+
+
+def _short(item: Any) -> str:
+    """Return a value as JSON has it, of a long one its beginning."""
+    text = json.dumps(item)
+    return text if len(text) <= 40 else f'{text[:37]}...'
 
 
 def read_model(robot: Robot, path: Path | str) -> Model:
     """Return the model of a diagnosis file, on the robot it was made for."""
     content = read_diagnosis(path)
     model = content.get('model')
-    if not isinstance(model, dict):
+    if model is None:
         raise ModelError(_without_model(path, content))
     applied = _applied(content)
-    mends = tuple(mend for item in applied if isinstance(mend := item.get('mend'), dict))
+    mends = tuple(mend for item in applied if (mend := item.get('mend')))
     robot = replayed(mends, Given((), robot)).robot
     _refuse_other_robot(robot, path, model)
     try:
@@ -166,7 +217,7 @@ def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
 
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:
     wrong = content.get('unsound')
-    if wrong and isinstance(wrong[0], dict):
+    if wrong:
         sentence = str(wrong[0].get('sentence', '')).rstrip('.')
         return f"diagnosis '{path}' holds no model, for its data were unsound: {sentence}"
     return f"diagnosis '{path}' holds no model; make it anew with diagnose"
@@ -187,11 +238,7 @@ def _refuse_other_robot(robot: Robot, path: Path | str, model: dict[str, Any]) -
 
 def _applied(content: dict[str, Any]) -> list[dict[str, Any]]:
     """Return what was wrong with the data of a diagnosis and was undone, in its order."""
-    return [
-        item
-        for item in content.get('unsound') or ()
-        if isinstance(item, dict) and item.get('applied')
-    ]
+    return [item for item in content.get('unsound') or () if item.get('applied')]
 
 
 def mended_source(

@@ -104,9 +104,7 @@ def program_model(
         placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
         result, posterior = from_now_on(model.found), read_posterior(robot, path)
         if posterior is not None:
-            frames = posterior.moved_frames(setup)
-            result, posterior = posterior.of_the_arm().centred(result)
-            result = (*result, *frames)
+            result, posterior = posterior.of_the_arm().centred(result, setup)
         effects = (*from_now_on(model.known), *result)
         _refuse_by_effort(effects, path)
         return ProgramModel(placed, effects, posterior, temperature, setup)

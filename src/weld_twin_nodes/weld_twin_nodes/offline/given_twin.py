@@ -88,8 +88,7 @@ def entries_of(content: Mapping[str, Any]) -> list[Any]:
 def other_readings(content: Mapping[str, Any]) -> str:
     """Return why a diagnosis counts joints otherwise than they are read; nothing where it does not."""
     for item in content.get('unsound') or ():
-        mend = item.get('mend') if isinstance(item, dict) and item.get('applied') else None
-        if isinstance(mend, dict) and mend.get('do') == 'joints':
+        if item.get('applied') and (item.get('mend') or {}).get('do') == 'joints':
             return f'{item.get("sentence")} {item.get("remedy")}, then diagnose again'
     return ''
 
@@ -107,13 +106,16 @@ def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
 
 def left_behind(content: Mapping[str, Any], effects: Sequence[Effect]) -> list[str]:
     """Return in a sentence each what a diagnosis found and effects that go on from it are without."""
-    kinds = {REGISTRY[str(entry['effect'])] for entry in entries_of(content)}
-    kinds -= {type(effect) for effect in effects}
+    there = [effect.to_mapping() for effect in effects]
+    left = (
+        REGISTRY[str(entry['effect'])].traits
+        for entry in entries_of(content)
+        if entry not in there
+    )
     return [
-        f'{kind.traits.title} grew with the time while it was recorded, and nobody knows how large it '
-        'is now: it is left out, as at the first stamp of the recording'
-        for kind in sorted(kinds, key=lambda kind: kind.name)
-        if kind.traits.endless
+        f'{title} grew with the time while it was recorded, and nobody knows how large it is now: it is '
+        'left out, as at the first stamp of the recording'
+        for title in sorted({traits.title for traits in left if traits.endless})
     ]
 
 

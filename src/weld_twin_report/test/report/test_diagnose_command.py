@@ -348,10 +348,13 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
 @pytest.mark.parametrize(
     ('spoil', 'reason'),
     [
-        (lambda d: d['verdict'].update(causes=[7]), 'the model of diagnosis'),
+        (
+            lambda d: d['verdict'].update(causes=[7]),
+            'verdict.causes[0] needs a mapping, and has 7',
+        ),
         (lambda d: d['model']['alone'].update(whole_recorded_m=None), 'the model of diagnosis'),
-        (lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs was changed'),
-        (lambda d: d['model'].update(counted=[]), 'how joints are counted is told by'),
+        (lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs[0].use needs a text'),
+        (lambda d: d['model'].update(counted=[]), 'model.counted needs a mapping, and has []'),
         (lambda d: d.update(shrink=None), 'shrink of the diagnosis means nothing'),
         (lambda d: d['gap'].pop('noise_floor_m'), 'shrink of the diagnosis means nothing'),
     ],

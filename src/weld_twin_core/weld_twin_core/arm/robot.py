@@ -26,6 +26,9 @@ _WORKPIECE_KEYS = {'name', 'convention', 'base', 'tool', 'joints', 'links', 'pay
 _CONTROL = re.compile(r'[\x00-\x1f\x7f\x85\u2028\u2029]')
 """Control characters, and what ends a line in Unicode."""
 _TOP_KEYS = _WORKPIECE_KEYS | {'gravity', 'source', 'plausible', 'controller', 'workpiece'}
+UNHURRIED = (1.3, 0.25)
+"""Speeds that plans keep where the robot file has none: of a joint that turns, that of the slowest of
+the bundled robots' [rad/s]; of a slide, the reduced speed of ISO 10218-1 [m/s]."""
 _LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
 _JOINT_KEYS = {'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', *_LIMITS}
 _PER_ROW: tuple[str, ...] = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
@@ -163,6 +166,12 @@ class Robot:
     def n(self) -> int:
         """Return the number of joints."""
         return len(self.joint_names)
+
+    @property
+    def planned_velocity(self) -> Array:
+        """Return the speeds that plans keep, shape (n,) [rad/s or m/s]: limits, or `UNHURRIED`."""
+        usual = np.where(self.prismatic, UNHURRIED[1], UNHURRIED[0])
+        return np.where(np.isfinite(self.max_velocity), self.max_velocity, usual)
 
     @property
     def T_base_origin(self) -> Array:

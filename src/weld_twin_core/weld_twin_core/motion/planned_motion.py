@@ -105,7 +105,8 @@ def plan(
     torch : Torch, optional
         Left out, upright on the seam.
     fit : bool
-        Slow the motion down until it is within the joint limits, instead of refusing it.
+        Slow the motion down until it is within the joint limits (`Robot.planned_velocity`), instead of
+        refusing it.
     seed : array, shape (n,), optional
         Joint positions near which the motion begins.
     told : array, shape (K, m) [rad or m], optional
@@ -139,7 +140,8 @@ def plan(
     for _ in range(20):
         timing = _slowed(law.sample(path.length, dt / slowed, most_samples), slowed)
         motion, residual = line.motion(timing)
-        velocity, acceleration = _use(robot, motion)
+        fastest = robot.planned_velocity if fit else robot.max_velocity
+        velocity, acceleration = _use(robot, motion, fastest)
         excess = max(velocity.max(), np.sqrt(acceleration.max()))
         if excess <= 1.0 or not fit:
             break
@@ -228,9 +230,9 @@ def _accelerations(motion: JointMotion) -> Array:
     return np.gradient(motion.velocity, motion.t, axis=0)
 
 
-def _use(robot: Robot, motion: JointMotion) -> tuple[Array, Array]:
+def _use(robot: Robot, motion: JointMotion, fastest: Array) -> tuple[Array, Array]:
     """Return the largest velocity and acceleration as part of the limits, shape (n,) each."""
-    velocity = np.abs(motion.velocity).max(axis=0) / robot.max_velocity
+    velocity = np.abs(motion.velocity).max(axis=0) / fastest
     return velocity, np.abs(_accelerations(motion)).max(axis=0) / robot.max_acceleration
 
 

@@ -73,7 +73,7 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
     leave, arrive = [], [0.0]
     for k, step in enumerate(np.abs(np.diff(q, axis=0))):
         way = max(
-            PEAK_VELOCITY * float((step / robot.max_velocity).max()) / EASY,
+            PEAK_VELOCITY * float((step / robot.planned_velocity).max()) / EASY,
             float(np.sqrt(PEAK_ACCELERATION * (step / robot.max_acceleration).max() / EASY)),
             1.0 / rate,
         )

@@ -199,7 +199,7 @@ class UrscriptReader(Reader):
         via = refs[0][0] if kind == 'circular' and refs[0] else None
         speed = self.value(given.get('v'), DEFAULT_SPEED[kind])
         if kind == 'joint':
-            speed = float(speed / np.max(self.context.robot.max_velocity))
+            speed = float(speed / np.max(self.context.robot.planned_velocity))
         stop = self.value(given.get('r'), 0.0) <= 0.0
         base, speed = Frame('', np.eye(4)), max(speed, LEAST_SPEED)
         step = Step(kind, where, end_ref, via, self.tool, base, speed, stop, suits=suits)

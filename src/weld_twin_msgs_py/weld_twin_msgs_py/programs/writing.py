@@ -151,7 +151,7 @@ def _urscript(program: Exported) -> str:
     rows = [f'def {program.name}():', *(f'  # {text}' for text in program.comments)]
     rows.append(f'  set_tcp(p[{comma(UR_POSE.numbers(program.tool, [0.0] * 7), 7)}])')
     on, off = (f'  set_digital_out({program.trigger}, {word})' for word in ('True', 'False'))
-    fastest = float(program.context.robot.max_velocity.max())
+    fastest = float(program.context.robot.planned_velocity.max())
     old = [0.0] * 7
 
     def move(_: int, step: ExportMove) -> list[str]:

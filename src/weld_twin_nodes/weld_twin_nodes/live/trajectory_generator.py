@@ -16,6 +16,7 @@ from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.messages import from_messages, topics
 from weld_twin_msgs_py.messages.cdr import JointStateEncoder
 
+from ..offline.exporting import without_limits
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
 from .cell_node import CellNode
 from .robot_settings import ROBOT_SETTINGS, measuring_frame, robot_of
@@ -242,6 +243,8 @@ class TrajectoryGenerator(CellNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('trajectory_generator', **kwargs)
         self._robot = robot_of(self)
+        for note in without_limits(self._robot):
+            self.remark(note)
         self._law = self.setting('profile'), self.setting('rate'), self.setting('speed')
         self._playback = self.setting('playback')
         self._encode = JointStateEncoder(self._robot.joint_names)

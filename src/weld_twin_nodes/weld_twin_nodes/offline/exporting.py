@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.robot import UNHURRIED, Robot
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
@@ -101,21 +101,20 @@ def export(
 
 
 def without_limits(robot: Robot) -> list[str]:
-    """Return that no limits are known of some joints; a URDF may leave them out, and none is kept."""
+    """Return what is kept where limits of some joints are not known; a URDF may leave them out."""
+    turning, sliding = UNHURRIED
     finite = {
-        'position': np.isfinite(robot.lower) & np.isfinite(robot.upper),
-        'speed': np.isfinite(robot.max_velocity),
+        'position': (np.isfinite(robot.lower) & np.isfinite(robot.upper), 'none is kept'),
+        'speed': (
+            np.isfinite(robot.max_velocity),
+            f'motions are planned for {turning:g} rad/s, or {sliding:g} m/s of a slide',
+        ),
     }
-    lacking = [
-        f'of {what} for {", ".join(np.array(robot.joint_names)[~known])}'
-        for what, known in finite.items()
-        if not known.all()
-    ]
-    if not lacking:
-        return []
     return [
-        f'the robot file has no limit {" and ".join(lacking)}, so none is kept; write it in, or check '
-        'every move before the arm makes it'
+        f'the robot file has no limit of {what} for {", ".join(np.array(robot.joint_names)[~known])}, '
+        f'so {kept}; write it in, or check every move before the arm makes it'
+        for what, (known, kept) in finite.items()
+        if not known.all()
     ]
 
 
@@ -215,11 +214,11 @@ def _moves(plan: Plan, context: Context, speeds: Speeds) -> tuple[ExportMove, ..
         share = speeds.share
         if not (plan.stations or plan.linear or k == 0):
             time = max(float(plan.t[k] - plan.t[k - 1]), 1e-3)
-            share = min(share, max(float((step / robot.max_velocity).max()) / time, 1e-3))
+            share = min(share, max(float((step / robot.planned_velocity).max()) / time, 1e-3))
         way = 0.0
         if k:
             way = float(np.linalg.norm(places[k, :3, 3] - places[k - 1, :3, 3]))
-        duration = max(float((step / robot.max_velocity).max()) / share, 0.02)
+        duration = max(float((step / robot.planned_velocity).max()) / share, 0.02)
         speed = min(max(way / duration, 1e-3), speeds.tool) if k else speeds.tool
         if linear:
             speed = min(plan.speed, speeds.tool)

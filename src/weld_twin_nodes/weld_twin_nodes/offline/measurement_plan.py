@@ -122,7 +122,7 @@ def _took(robot: Robot, q: Array, seconds: float) -> Array:
 
 def _travel(robot: Robot, steps: Array) -> Array:
     """Return the time of joint moves at the share of a first run, shape (..., ) [s]."""
-    return np.asarray((np.abs(steps) / robot.max_velocity).max(axis=-1) / SLOW[0])
+    return np.asarray((np.abs(steps) / robot.planned_velocity).max(axis=-1) / SLOW[0])
 
 
 def _way(robot: Robot, q: Array) -> list[int]:

@@ -13,8 +13,8 @@ from command_line import done, refused
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.joint_file import read_joint_motion
-from weld_twin_msgs_py.robots import load_robot, write_urdf
+from weld_twin_msgs_py.files.joint_file import read_joint_motion, through_stations
+from weld_twin_msgs_py.robots import load_robot, read_urdf, write_urdf
 
 TURNS = [
     (0.0, -1.5708, 0.45),
@@ -121,15 +121,24 @@ def test_a_urdf_that_leaves_limits_out_is_told_where_moves_are_planned_or_writte
     limits = re.findall('<limit .*?/>', urdf.read_text())
     bare = urdf.read_text().replace(limits[1], '').replace(limits[3], '<limit velocity="6.5"/>')
     one, other = ROBOT.joint_names[1], ROBOT.joint_names[3]
-    said = f'note: the robot file has no limit of position for {one}, {other} and of speed for {one}, '
+    position = f'the robot file has no limit of position for {one}, {other}, so none is kept'
+    speed = f'no limit of speed for {one}, so motions are planned for 1.3 rad/s'
     words = ('investigate', '--tolerance', 0.3, '--postures', 24, '--out', tmp_path / 'plan')
     assert 'no limit' not in done(*words, '--robot', urdf, '--force')
     urdf.write_text(bare)
-    assert said in done(*words, '--robot', urdf, '--force')
+    result = done(*words, '--robot', urdf, '--force')
+    assert position in result and speed in result
     stations = tmp_path / 'plan/stations.yaml'
-    words = ('export', 'program', stations, '--robot', urdf, '--controller', 'krl')
-    assert said in done(*words, '--out', program)
-    assert said[6:] in (tmp_path / 'stations.src.md').read_text()
+    words = ('export', 'program', stations, '--robot', urdf, '--controller')
+    assert position in done(*words, 'krl', '--out', program)
+    assert position in (tmp_path / 'stations.src.md').read_text()
+    assert speed in done(*words, 'urscript', '--out', tmp_path / 'stations.script')
+    rates = re.findall(r'v=([^,]+)', (tmp_path / 'stations.script').read_text())
+    assert rates and all(0.0 < float(rate) < 1.3 for rate in rates)
+    robot = read_urdf(urdf)
+    t, q, _ = read_joint_motion(stations, robot)
+    speeds = np.abs(through_stations(robot, t, q, 50.0).velocity).max(axis=0)
+    assert speeds[1] < 1.3 and speeds.max() > 0.2
 
 
 def test_a_table_that_was_filled_in_outlives_another_plan(tmp_path):

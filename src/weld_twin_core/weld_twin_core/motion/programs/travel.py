@@ -299,7 +299,7 @@ def _joint_move(chain: CarriedArm, course: _Course, move: Move, q: Array | None)
         return _Reached(end[None], np.zeros(1), -1)
     count = int(np.clip(np.ceil(np.abs(end - q).max() / _TURN) + 1, 3, _SHORT))
     share = np.linspace(0.0, 1.0, count)[:, None]
-    duration = float((np.abs(end - q) / arm.max_velocity).max()) / max(move.speed, 1e-3)
+    duration = float((np.abs(end - q) / arm.planned_velocity).max()) / max(move.speed, 1e-3)
     times = share[:, 0] * max(move.duration or duration, _LEAST_TIME)
     return _Reached(q + share * (end - q), times, -1)
 

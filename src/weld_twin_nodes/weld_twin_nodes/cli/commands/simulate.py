@@ -34,6 +34,7 @@ def run(given: Given) -> int:
 
 
 def _simulate(given: Given) -> int:
+    from ...offline.exporting import without_limits
     from ...offline.seam_motion import plan_motion, stamps
     from ...offline.simulation import Simulation, write_simulation
 
@@ -49,6 +50,7 @@ def _simulate(given: Given) -> int:
     simulation = Simulation(real, model, plan.motion, begin, given.seed, plan.length)
     made = {'path': given.path, 'profile': given.profile, 'rate_hz': given.rate}
     metrics = write_simulation(given.out, simulation, storage=given.storage, provenance=made)
+    print(*(f'note: {note}\n' for note in without_limits(robot)), sep='', end='')
     if plan.report.slowed > 1.0:
         print(f'slowed down {plan.report.slowed:.2f} times, to stay within the joint limits')
     print(

@@ -20,6 +20,7 @@ from weld_twin_msgs_py.bags import (
     BagWriter,
     provenance,
     read_recording,
+    recover,
     write_recording,
 )
 from weld_twin_msgs_py.messages.to_messages import bag_messages
@@ -327,6 +328,35 @@ def test_stamps_and_topics_that_cannot_be_used_are_an_error(
     write_messages(tmp_path / 'bag', joint_states([k * SECOND for k in stamps]))
     with pytest.raises(DataError, match=words):
         read_recording(tmp_path / 'bag', robot, TopicNames(**topics))
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+@pytest.mark.parametrize('steady', [False, True], ids=['its own stamps', 'stamps of another'])
+def test_a_clock_set_back_while_it_was_recorded_is_told_and_mended(
+    tmp_path, robot, storage, steady
+):
+    first, then = [50, 51, 52, 53], [51, 52, 53, 54]
+    stamps = range(50, 58) if steady else first + then
+    with BagWriter(tmp_path / 'bag', storage=storage) as bag:
+        states = joint_states([k * SECOND for k in stamps])
+        for log, (topic, message) in zip(first + then, states, strict=True):
+            bag.write(topic, message, log * SECOND)
+    told = (
+        r"set back by 2\.000 s at message 4 of '/joint_states', .* 'weld-twin bag recover .*bag'"
+    )
+    with pytest.raises(DataError, match=told):
+        read_recording(tmp_path / 'bag', robot)
+    mended = recover(tmp_path / 'bag')
+    assert 'each file as a recording' in mended.damage[0]
+    if steady:
+        q = read_recording(mended.path, robot).joints.q
+        np.testing.assert_allclose(q[:, 0], np.arange(50.0, 58.0))
+        return
+    with pytest.raises(DataError, match=r'jump back by 2\.000 s'):
+        read_recording(mended.path, robot)
+    files = sorted(file for file in mended.path.iterdir() if file.suffix != '.yaml')
+    for file, each in zip(files, (first, then), strict=True):
+        np.testing.assert_allclose(read_recording(file, robot).joints.q[:, 0], each)
 
 
 def test_clocks_without_overlap_are_an_error(tmp_path, robot, recording):

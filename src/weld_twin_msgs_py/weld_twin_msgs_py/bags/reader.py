@@ -20,9 +20,11 @@ from tempfile import TemporaryDirectory
 from traceback import clear_frames
 from typing import Any, NamedTuple
 
+import numpy as np
 import yaml
 from lz4.frame import LZ4FrameDecompressor
 from mcap.reader import make_reader
+from numpy.typing import NDArray
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader, storage_mcap
 
@@ -33,12 +35,17 @@ from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode, types_with
 from .segment import INFORMATION, METADATA, SUFFIXES, recover_command
 from .writers import UNFINISHED, is_growing, unfinished
 
+IntArray = NDArray[np.int64]
 PACKED = '.zstd'
 TABLES = ('.csv', '.tsv', '.txt')
 SIZE_LIMIT = 16_000_000
 """Bytes of metadata.yaml; a bag of a thousand files has some hundred kilobytes."""
 DEPTH_LIMIT = 50
 """Levels of metadata.yaml; it has six."""
+SET_BACK = 100_000_000
+"""Time [ns] by which messages of one topic never come in another order than they are written."""
+_INDEX_HEAD = 1 + 8 + 2
+"""Bytes of a record MessageIndex of MCAP before its list: what it is, its length, and the channel."""
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
@@ -324,6 +331,7 @@ class BagReader:
                 wanted = [c for c in reader.connections if c.topic in topics]
                 if not wanted:
                     continue
+                self._refuse_set_back(reader)
                 for connection, log_ns, data in reader.messages(wanted):
                     whole = unzstd(data) if self._packed else data
                     yield connection.topic, connection.msgtype, log_ns, whole
@@ -332,6 +340,7 @@ class BagReader:
         """Yield topic, stamp [ns], and whether that is the header's or of the recording."""
         with clear_errors(self.path):
             for reader in self._readers:
+                self._refuse_set_back(reader)
                 stamped = {c.id: has_header(c.msgtype) for c in reader.connections}
                 for connection, log_ns, data in reader.messages():
                     if stamped[connection.id]:
@@ -339,6 +348,20 @@ class BagReader:
                         yield connection.topic, first_time_ns(whole), True
                     else:
                         yield connection.topic, log_ns, False
+
+    def _refuse_set_back(self, reader: Reader) -> None:
+        """Refuse messages that are read in the order of a clock that was set back meanwhile."""
+        for number, times in _as_written(reader.storage):
+            falls = np.maximum.accumulate(times) - times
+            if falls.max(initial=0) > SET_BACK:
+                at = int(np.argmax(falls > SET_BACK))
+                names = [c.topic for c in reader.connections if c.id == number]
+                raise DataError(
+                    f"the clock of the computer that recorded '{self.path}' was set back by "
+                    f"{falls[at] * 1e-9:.3f} s at message {at} of '{names[0]}', so that what came "
+                    f"before and after lies on each other; 'weld-twin bag recover {self.path}' parts "
+                    'it there'
+                )
 
     def _list_topics(self) -> None:
         for reader in self._readers:
@@ -365,6 +388,30 @@ class BagReader:
         if file.suffix == '.db3':
             _refuse_truncated(file)
         self._readers.append(self._stack.enter_context(Reader(file)))
+
+
+def _as_written(storage: Any) -> Iterator[tuple[int, IntArray]]:
+    """Yield each connection and its times of recording [ns] as they were written, by the index alone."""
+    if isinstance(storage, storage_mcap.McapReader) and storage.bio is not None:
+        parts: dict[int, list[IntArray]] = {}
+        for chunk in sorted(storage.chunks, key=lambda chunk: chunk.chunk_start_offset):
+            for number, place in chunk.message_index_offsets.items():
+                storage.bio.seek(place + _INDEX_HEAD)
+                size = int.from_bytes(storage.bio.read(4), 'little')
+                rows = np.frombuffer(storage.bio.read(size), '<i8').reshape(-1, 2)
+                parts.setdefault(number, []).append(rows[np.argsort(rows[:, 1]), 0])
+        yield from ((number, np.concatenate(times)) for number, times in parts.items())
+        return
+    # In this order the index of rosbag2 has all there is to know, and no message is read.
+    rows = np.array(
+        list(storage.dbconn.execute('SELECT timestamp, id FROM messages ORDER BY timestamp')),
+        np.int64,
+    ).reshape(-1, 2)
+    times = rows[np.argsort(rows[:, 1]), 0]
+    if (np.maximum.accumulate(times) - times).max(initial=0) > SET_BACK:
+        read = storage.dbconn.execute('SELECT topic_id, timestamp FROM messages ORDER BY id')
+        rows = np.array(list(read), np.int64).reshape(-1, 2)
+        yield from ((int(k), rows[rows[:, 0] == k, 1]) for k in np.unique(rows[:, 0]))
 
 
 def _provenance(custom: Mapping[Any, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from weld_twin_core.errors import DataError
 
 from ..files.whole_files import followed
 from ..messages.typestore import TYPES, decode, types_with
-from .reader import look, storage_files, unlz4, unzstd
+from .reader import SET_BACK, look, storage_files, unlz4, unzstd
 from .segment import SUFFIXES, Channel, Segments, clear_write_errors, sync
 from .writers import NOTES, UNFINISHED, custom_data, is_growing, lock, unfinished
 
@@ -217,6 +217,10 @@ def _channels(base: sqlite3.Connection) -> dict[Any, Channel]:
 
 _STORAGE = {'.mcap': ('mcap', salvage_mcap), '.db3': ('sqlite3', salvage_sqlite)}
 _SCRATCH = '.recovering'
+_PARTED = (
+    'was recorded while the clock was set back by {:.3f} s: what came after that is in a file of its '
+    'own; where they are refused together, give each file as a recording'
+)
 
 
 @dataclass(frozen=True)
@@ -326,11 +330,19 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
     files = _files(source)
     storage = _STORAGE[files[0].suffix][0]
     segments = Segments(folder, name, storage)
+    latest: dict[str, int] = {}
     try:
         for k, file in enumerate(files):
             if k:
                 segments.split()
             for result in _STORAGE[file.suffix][1](file, damage):
+                topic, log_ns = result[0].topic, result[1]
+                back = latest.get(topic, log_ns) - log_ns
+                if back > SET_BACK:
+                    segments.split()
+                    latest.clear()
+                    damage.tell(file, _PARTED.format(back * 1e-9))
+                latest[topic] = log_ns
                 _write(segments, result, file, counts, damage)
         segments.finish(_provenance(source, damage))
     finally:

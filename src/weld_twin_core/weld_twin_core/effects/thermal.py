@@ -272,7 +272,7 @@ class JointWarmUp(_WarmUp):
 
     traits = replace(
         _WarmUp.traits,
-        title='warm-up of the joint',
+        title='thermal zero drift',
         meaning="a joint's zero moves as its gear warms up",
         formula='θ → θ + offset w, w as of `link_warm_up`',
     )

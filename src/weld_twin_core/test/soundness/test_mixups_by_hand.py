@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from measured_cells import asked, moving, recorded, rejointed, stations
 
+from weld_twin_core.arm import catalog
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.soundness import mixups as mix_ups
@@ -65,6 +66,20 @@ def test_of_mix_ups_that_do_as_well_the_first_of_the_table_is_named_and_the_othe
     assert best.suspicion is pan and best.alike == (again,) and best.off < 1.0
     assert _best(shot, arm, [elbow]) is None and _best(shot, arm, []) is None
     assert best.undone.remaining < 1e-4 < shot.remaining
+
+
+def test_a_joint_counted_from_the_ground_is_told_where_one_joint_moves_at_a_time(rng):
+    """Its reading stands still while it moves with joint 2, and a swap leaves a tenth of the gap."""
+    robot = catalog.load('fanuc_m10ia')
+    bases = [(-40, 0), (-40, 5), *((-35, 5 - 5 * k) for k in range(10))]
+    postures = [np.array([-35.0, two, three, 2, -56, -33]) for two, three in bases]
+    pendant = np.radians([p + step for p in postures for step in [np.zeros(6), *np.eye(6)]])
+    turned = pendant + pendant[:, [1]] * np.eye(6)[2]
+    motion = JointMotion(np.arange(len(turned), dtype=float), turned, None, True)
+    tool = ToolPose([0.2, -0.21, 0.01])
+    swept = recorded(robot, motion, rng, (tool,), points=True)
+    (told,) = diagnose([rejointed(swept, pendant)], robot, align=('base', 'tool')).unsound
+    assert told.kind == 'coupled_axes' and told.at == ('joint_2', 'joint_3')
 
 
 def test_what_is_known_of_joints_stays_with_the_robot_they_are_of(ur5, still):

@@ -38,9 +38,20 @@ from .stamps import clocks, stamps, streams, velocities_checked
 from .stuck import stuck
 from .touches import touches
 
+
+def readings(case: Case) -> Sequence[Finding]:
+    """
+    Return what stands still, or the mix-up that explains it.
+
+    A joint that is counted from the ground reads the same while the one before it carries it along.
+    """
+    still = list(stuck(case))
+    return [each for each in mixups(case) if each.mend] or still if still else []
+
+
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
-    'readings': (stuck, 'No reading stands still while the tool moves.'),
+    'readings': (readings, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
     'images': (images, 'No camera measured.'),
     'rows': (rows, 'Each measurement belongs to the station that it stands beside.'),

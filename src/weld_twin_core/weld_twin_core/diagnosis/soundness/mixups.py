@@ -160,13 +160,14 @@ def _best(shot: Snapshot, before: Arm, tries: Iterable[Finding]) -> _Tried | Non
         return None
     fitted: dict[int, _Tried] = {}
     shots = [trial for _, trial in tried]
-    # Without orientations a quick fit may end beside the tool vector: then from many starts.
+    # Without orientations a quick fit may end beside the tool vector: then from many starts, also
+    # where what it found leaves something wrong, for it may have passed over what leaves nothing.
     for thorough in (False,) if shot.turned else (False, True):
         for k in np.argsort(_rough(shots, before, thorough), kind='stable')[:SHORTLIST].tolist():
             if k not in fitted:
                 fitted[k] = _Tried(tried[k][0], shots[k], shots[k].arm)
         least = min(each.off for each in fitted.values())
-        if least < before.off / CLEAR:
+        if least < min(1.0, before.off / CLEAR):
             break
     if least > WORTH * before.off:
         return None

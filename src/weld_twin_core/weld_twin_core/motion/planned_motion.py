@@ -140,8 +140,7 @@ def plan(
     for _ in range(20):
         timing = _slowed(law.sample(path.length, dt / slowed, most_samples), slowed)
         motion, residual = line.motion(timing)
-        fastest = robot.planned_velocity if fit else robot.max_velocity
-        velocity, acceleration = _use(robot, motion, fastest)
+        velocity, acceleration = _use(robot, motion, fit)
         excess = max(velocity.max(), np.sqrt(acceleration.max()))
         if excess <= 1.0 or not fit:
             break
@@ -230,8 +229,9 @@ def _accelerations(motion: JointMotion) -> Array:
     return np.gradient(motion.velocity, motion.t, axis=0)
 
 
-def _use(robot: Robot, motion: JointMotion, fastest: Array) -> tuple[Array, Array]:
+def _use(robot: Robot, motion: JointMotion, fit: bool) -> tuple[Array, Array]:
     """Return the largest velocity and acceleration as part of the limits, shape (n,) each."""
+    fastest = robot.planned_velocity if fit else robot.max_velocity
     velocity = np.abs(motion.velocity).max(axis=0) / fastest
     return velocity, np.abs(_accelerations(motion)).max(axis=0) / robot.max_acceleration
 

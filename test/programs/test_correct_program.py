@@ -349,7 +349,9 @@ def test_nothing_within_the_cap_is_an_error_that_says_so(tmp_path):
 @pytest.mark.parametrize(
     'line',
     [
-        '  movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]))',
+        '  movel(pose_add(get_actual_tcp_pose(), next_shift))',
+        '  movel(pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0.1]))',
+        '  clean()  movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]))',
         '  movel(next_point)',
         '  speedl([0.1, 0, 0, 0, 0, 0], 0.5, 1)',
     ],
@@ -393,6 +395,32 @@ def test_a_weld_of_increments_is_written_in_full_and_goes_where_it_meant(tmp_pat
     goals = [first, weld, weld @ along(2, -0.05)]
     real = driven(robot, tool, reader([text]), near)[1:]
     assert max(np.abs(g - r)[:3].max() for g, r in zip(goals, real, strict=True)) < 4e-6
+
+
+@pytest.mark.parametrize(
+    'away',
+    [
+        'pose_trans(there, p[0, 0, -0.05, 0, 0, 0])',
+        'pose_trans(get_target_tcp_pose(), p[0, 0, -0.05, 0, 0, 0])',
+        'pose_add(get_actual_tcp_pose(), p[0, 0, 0.05, 0, 0, 0])',
+    ],
+)
+def test_a_weld_is_corrected_as_ever_where_the_way_out_counts_from_its_end(away, tmp_path):
+    rows = SEAM.splitlines()
+    there = f'  there = {rows[3][8 : rows[3].index("]") + 1]}'
+    rows[3] = '  movel(there, v=0.1)'
+    rows.insert(1, there)
+    (tmp_path / 'plain').mkdir()
+    assert corrected(tmp_path / 'plain', '\n'.join([*rows, ''])).code == 0
+    rows[5:5] = ['  set_digital_out(1, False)', '  sleep(0.5)', f'  movel({away})']
+    assert 'left as it was' not in corrected(tmp_path, '\n'.join([*rows, ''])).out
+    told = [
+        (folder / 'out' / 'seam.script').read_text().splitlines()
+        for folder in (tmp_path / 'plain', tmp_path)
+    ]
+    assert told[1][5:8] == rows[5:8] and told[1][1] != there
+    numbers = [np.array(readers.re.findall(readers.NUMBER, row[1]), float) for row in told]
+    np.testing.assert_allclose(numbers[0], numbers[1], atol=2e-7)
 
 
 FANUC_TURN = """/PROG  P

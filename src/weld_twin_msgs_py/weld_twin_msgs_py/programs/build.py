@@ -56,6 +56,16 @@ class Ref(NamedTuple):
     after: Array | None = None
     leads: bool = True
 
+    def beside(self, before: Array | None = None, after: Array | None = None) -> 'Ref':
+        """Return a place that goes along with this one, shifted in its base or in itself, (4, 4)."""
+        return Ref(self.point, _then(before, self.before), _then(self.after, after), False)
+
+
+def _then(first: Array | None, second: Array | None) -> Array | None:
+    if first is None or second is None:
+        return second if first is None else first
+    return np.asarray(first @ second)
+
 
 @dataclass(frozen=True, eq=False)
 class Step:

@@ -26,7 +26,7 @@ from weld_twin_core.motion.programs.travel import Kind
 
 from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .controllers import Context, Frame
-from .reader import LEAST_SPEED, Blocks, Frames, Reader, unclear, unclear_shift
+from .reader import LEAST_SPEED, Blocks, Frames, Reader, Span, unclear, unclear_shift
 from .source import UR_POSE, Notation, Number, Source, closing, stripped
 
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
@@ -64,6 +64,14 @@ _ASSIGNED = re.compile(
 )
 
 
+_LED = re.compile(r'\bmove[jlpc]\s*\(\s*([A-Za-z_]\w*)\s*[,)](?:\s*([A-Za-z_]\w*)\s*[,)])?')
+_WHERE_IT_IS = re.compile(r'get_(?:actual|target)_tcp_pose\s*\(\s*\)\Z')
+_IN_PLACE = re.compile(
+    r'(?:\s|;|(?:sleep|sync|textmsg|set_\w*(?:digital|analog)_out)\s*\([^()]*\))*(?:move[jlpc]\s*)?\Z'
+)
+"""What stands between two moves where nothing else moves the arm, and no other line leads there."""
+
+
 class UrscriptReader(Reader):
     """Goes through a script once."""
 
@@ -79,6 +87,10 @@ class UrscriptReader(Reader):
         self.around: list[Frames | None] = []
         """Blocks that are open; of a routine what holds around it."""
         self.displaced = _displaces(self.text)
+        self.led = {name for match in _LED.finditer(self.text) for name in match.groups() if name}
+        """Variables that moves lead to."""
+        self.start = self.reached = 0
+        """Where the arguments of the move at hand begin, and where the last move ends."""
 
     def read(self) -> Program:
         routines = self._routines()
@@ -184,6 +196,7 @@ class UrscriptReader(Reader):
 
     def _move(self, word: str, where: str, start: int, end: int) -> None:
         kind, order = MOVES[word]
+        self.start = start - 1
         given = self._arguments(order, start, end)
         try:
             refs = [self._ref(*given[name]) for name in order[: 1 + (kind == 'circular')]]
@@ -204,6 +217,7 @@ class UrscriptReader(Reader):
         base, speed = Frame('', np.eye(4)), max(speed, LEAST_SPEED)
         step = Step(kind, where, end_ref, via, self.tool, base, speed, stop, suits=suits)
         self.program.add(replace(step, shift=self.shift))
+        self.reached = end + 1
 
     def _arguments(self, order: Sequence[str], start: int, end: int) -> dict[str, tuple[int, int]]:
         """Return the piece of text of every argument by its name."""
@@ -219,7 +233,7 @@ class UrscriptReader(Reader):
     def _ref(self, start: int, end: int) -> tuple[Ref, Suits | None] | None:
         """Return where a target leads, and the postures it allows; None where it is worked out."""
         text = self.text[start:end]
-        call = re.match(r'(pose_trans|get_inverse_kin)\s*(\()', text)
+        call = re.match(r'(pose_trans|pose_add|get_inverse_kin)\s*(\()', text)
         if call is None:
             point = self._point(start, end)
             return None if point is None else (Ref(point), None)
@@ -231,12 +245,37 @@ class UrscriptReader(Reader):
             return self._near(parts)
         if len(parts) != 2:
             return None
+        beside = self._beside(call[1], *parts)
+        if beside is not None or call[1] == 'pose_add':
+            return None if beside is None else (beside, None)
         frame = self._frame(*parts[0])
         point = None if frame is None else self._point(*parts[1])
         if point is None:
             return None
         # The frame counts as a base: the point itself leads, and is moved in that frame.
         return Ref(point, frame), None
+
+    def _beside(self, call: str, first: Span, second: Span) -> Ref | None:
+        """Return a place beside one that a move leads to, or that the last one led to; else None."""
+        if self.text[second[0]] != 'p' or '[' not in self.text[slice(*second)]:
+            return None
+        name, place = self.text[slice(*first)], None
+        if name in self.led and name not in self.again:
+            point = self._constant(*first, 2)[0]
+            place = None if point is None else Ref(point)
+        elif _WHERE_IT_IS.match(name):
+            before = self.program.pieces[-1][-1:]
+            still = _IN_PLACE.match(self.text, self.reached, self.start)
+            if still and before and before[0].stop and before[0].tool is self.tool:
+                place = before[0].end
+        if place is None or self.program.points[place.point].value.ndim == 1:
+            return None
+        shift = self._frame(*second)
+        if shift is None:
+            return None
+        if call == 'pose_trans':
+            return place.beside(after=shift)
+        return place.beside(before=shift) if np.array_equal(shift[:3, :3], np.eye(3)) else None
 
     def _near(self, parts: Sequence[tuple[int, int]]) -> tuple[Ref, Suits | None] | None:
         point = self._point(*parts[0])

@@ -46,8 +46,6 @@ def listed(text: str) -> list[str]:
 
 
 class Study:
-    """A study that runs: its options, and its folder."""
-
     def __init__(self, args: Given) -> None:
         self.args = args
         self.out = Path(args.out or '')
@@ -121,6 +119,17 @@ def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) 
     """Return rows as a table in Markdown, by the head of each column and what it says of a row."""
     cells = [[tell(row) for tell in columns.values()] for row in rows]
     return markdown.table(tuple(columns), *cells)
+
+
+def shown(*keys: Any, by: str = '{}', times: float = 0.0, none: str = '') -> Callable[[Any], str]:
+    """Return a column that tells what is deep in a row, at some keys, by a format; ``none`` for None."""
+
+    def tell(row: Any) -> str:
+        for key in keys:
+            row = row[key]
+        return none if row is None else by.format(times * row if times else row)
+
+    return tell
 
 
 def head(schema: str, **more: Any) -> dict[str, Any]:

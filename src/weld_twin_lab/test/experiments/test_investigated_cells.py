@@ -57,8 +57,9 @@ def test_only_what_was_said_counts():
 
 def test_a_sealed_cell_records_with_what_was_changed():
     pytest.importorskip('mujoco', reason='the plant needs MuJoCo')
+    from weld_twin_lab.blind.blind_cell import Motion
     from weld_twin_lab.blind.making import lots
-    from weld_twin_lab.experiments.study import SealedCell, stations
+    from weld_twin_lab.experiments.study import SealedCell
     from weld_twin_nodes.offline.set_up_changes import set_up_change, with_changes
 
     number, lot = next(
@@ -67,9 +68,10 @@ def test_a_sealed_cell_records_with_what_was_changed():
     cell = SealedCell(lot, 3, number)
     middle = np.clip(np.zeros(cell.robot.n), cell.robot.lower + 0.6, cell.robot.upper - 0.6)
     q = middle + np.random.default_rng(1).uniform(-0.5, 0.5, (12, cell.robot.n))
-    plain = cell.made('plain', stations(q), 5)
-    moved = cell.made('moved', stations(q), 5, 'instrument')
-    longer = cell.made('longer', stations(q), 5, 'tool')
+    stations = Motion(15.0 * np.arange(12.0), q, static=True)
+    plain = cell.made('plain', stations, 5)
+    moved = cell.made('moved', stations, 5, 'instrument')
+    longer = cell.made('longer', stations, 5, 'tool')
     assert cell.seen_anew([moved]) and not cell.seen_anew([plain])
     step = np.linalg.norm(longer.measured.position - plain.measured.position, axis=1)
     assert np.abs(step - 0.2).max() < 0.01

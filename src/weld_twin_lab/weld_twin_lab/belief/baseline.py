@@ -97,8 +97,6 @@ def _brief(cause: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class Scored(NamedTuple):
-    """One case, scored."""
-
     name: str
     causes: int
     """At work."""
@@ -184,7 +182,6 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
     ]
     plain = [c for c in cases if not c.withheld]
     reported = [one for c in cases for one in c.reported]
-    sure = [c for c in cases if c.sure]
     out = {}
     for few, most in ((1, 2), (3, 4), (5, 6)):
         own = [c for c in plain if few <= c.causes <= most]
@@ -215,7 +212,7 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
             [c.confidence for c in cases], [c.right for c in cases]
         ),
         'unknown': share([c.status == 'unknown' for c in cases]),
-        'sure': share([c.sure for c in cases]) if sure else share([False for _ in cases]),
+        'sure': share([c.sure for c in cases]),
         'seconds, median': bootstrap([c.seconds for c in cases]),
     }
 

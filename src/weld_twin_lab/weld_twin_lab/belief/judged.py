@@ -39,10 +39,10 @@ from weld_twin_core.diagnosis.result import Cause as Told
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.registry import REGISTRY
 
-from ..blind.blind_cell import BlindCell, Take, as_recording, deviation, exact, floor, record
+from ..blind.blind_cell import BlindCell, Take, deviation, exact, floor, record
 from ..blind.cause_sizes import SIZES, Cause, Site, site
 from ..blind.making import SealedCase
-from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge
+from ..blind.scoring import NOT_IN_LIBRARY, Judged, answers_of, judge, measured_of
 from ..plant.exponentials import PlantRecording
 
 HERE = 'its joint'
@@ -93,7 +93,6 @@ def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
 
 
 def numbers(site: Site) -> int:
-    """Return how many numbers a family of the library has."""
     kind = REGISTRY.get(site[0])
     return sum(max(p.size, 1) for p in kind.parameters) if kind is not None else 0
 
@@ -176,14 +175,10 @@ def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
         gone and shows and not any(own & group for group in groups)
         for own, gone, shows in zip(at_work, out, seen, strict=True)
     )
+    status, rest = verdict['status'], any(cause.get('rest') for cause in verdict['causes'])
     nothing = 'none' if not any(seen) else ''
-    said = _left(verdict) if foreign else verdict['status'] in (*NAMING, nothing)
+    said = (status == 'unknown' or rest) if foreign else status in (*NAMING, nothing)
     return Whole(asked, named, all(named) and said and all(group & every for group in groups))
-
-
-def _left(verdict: Mapping[str, Any]) -> bool:
-    causes: Sequence[Mapping[str, Any]] = verdict['causes']
-    return verdict['status'] == 'unknown' or any(cause.get('rest') for cause in causes)
 
 
 STEP = 0.1
@@ -319,9 +314,8 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
         rows = off.ravel() / cell.tracker.sigma
         return np.asarray(rows - frames @ fitted(frames, rows) if frames.size else rows)
 
-    seen = as_recording('test', record(cell, case.causes, case.test, exact(cell.tracker)))
-    assert seen.measured is not None
-    model, t = found.model, seen.measured.t
+    seen = case.recorded('test', exact(cell.tracker))
+    model, t = found.model, measured_of(seen).t
     whole = model.twin(0).poses(seen, t).position
     real = [shown(deviation(cell, [own], case.test)) for own in case.causes]
     sites = [site(own) for own in case.causes]
@@ -340,7 +334,7 @@ def there(case: SealedCase, found: Diagnosis) -> list[dict[str, float] | None]:
             off = [rows for rows, own in zip(real, meant, strict=True) if own]
             return float(said @ np.sum(off, axis=0) / (said @ said)) if off else 0.0
 
-        places, dependences = _listed(told.place), _listed(told.dependence)
+        places, dependences = ({word for word, _ in of} for of in (told.place, told.dependence))
         return {
             'name': max(share([own in kind for own in sites]) for kind in _kinds(case, names)),
             'place': share([bool(own.places & places) for own in words]),
@@ -361,20 +355,16 @@ def _kinds(case: SealedCase, names: Sequence[Site]) -> list[set[Site]]:
     ]
 
 
-def _listed(told: Sequence[tuple[Any, float]]) -> set[str]:
-    return {str(word) for word, _ in told}
-
-
-def _complete(row: Mapping[str, Any]) -> bool:
-    """Return whether what a model misses on a sealed motion is noise, or a tenth of the gap."""
-    left, floor, gap = (row['sealed'][key] for key in ('after', 'floor', 'before'))
-    return bool(left**2 - floor**2 <= max(floor**2, LARGE * gap**2))
-
-
 def right(row: Mapping[str, Any]) -> bool:
-    """Return whether an answer is right as a whole: all that it names is there, and no more."""
+    """
+    Return whether an answer is right as a whole: all that it names is there, and no more.
+
+    What its model misses on a sealed motion is noise then, or a tenth of the gap.
+    """
     named = [own['name'] >= HALF for own in row['there'] if own is not None]
-    return row['verdict']['status'] in NAMING and all(named) and _complete(row)
+    left, floor, gap = (row['sealed'][key] for key in ('after', 'floor', 'before'))
+    complete = left**2 - floor**2 <= max(floor**2, LARGE * gap**2)
+    return row['verdict']['status'] in NAMING and all(named) and bool(complete)
 
 
 AS_WELL = 0.05

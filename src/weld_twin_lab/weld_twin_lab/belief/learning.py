@@ -40,98 +40,60 @@ from .judged import Example
 
 RISK, CAUSE_RISK = 0.003, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
-SUMMED = {'names': 1, 'least name': 1, 'told': 0, 'least size': 0, 'widest set': 0}
+
+
+def _terms(text: str) -> dict[str, int]:
+    """Return features by which way each counts: + for a statement, - against it, 0 either way."""
+    pairs = (part.split(' ', 1) for part in text.split(', '))
+    return {name: {'+': 1, '-': -1, '0': 0}[sign] for sign, name in pairs}
+
+
+SUMMED = _terms('+ names, + least name, 0 told, 0 least size, 0 widest set')
 """What the names told add up to."""
 NAMED = {
     **{name: way for name, way in SUMMED.items() if name != 'least size'},
-    'gap': 0,
-    'structure': -1,
-    'rows': 0,
-    'stations': 0,
-    'lacking': -1,
-    'cancelling': -1,
-    'left': -1,
-    'left unexplained': -1,
-    'instrument and base': -1,
+    **_terms(
+        '0 gap, - structure, 0 rows, 0 stations, - lacking, - cancelling, - left, '
+        '- left unexplained, - instrument and base'
+    ),
 }
 """What speaks for an answer that names causes; against it speaks that one of them has no name."""
-MANY = {
-    'growth': 1,
-    'least growth': 1,
-    'size over left': 1,
-    'rows': 0,
-    'structure': -1,
-    'kinds': 1,
-    'lacking': -1,
-}
+MANY = _terms(
+    '+ growth, + least growth, + size over left, 0 rows, - structure, + kinds, - lacking'
+)
 """What speaks for a kind of many small errors."""
-REST = {'weight': 1, 'second': -1, 'share': 1, 'steady': 1, 'groups': 0}
+REST = _terms('+ weight, - second, + share, + steady, 0 groups, 0 gap, 0 rows, 0 stations')
 TERMS: dict[str, dict[str, int]] = {
-    'name': {
-        'gap': 1,
-        'instrument and base': -1,
-        'left unexplained': -1,
-        'structure': -1,
-        'rows': 0,
-        'joints moving': 1,
-        'stations': 0,
-        'lacking': -1,
-        'behind': -1,
-        'cancelling': -1,
-        'weight': 1,
-        'evidence': 1,
-        'size': 1,
-        'faint beside others': -1,
-        'others of its curve': -1,
-        'part of a wave': -1,
-        'wander over size': -1,
-        'missed': 1,
-        'least missed': 1,
-        'shown beside others': 1,
-        'left at its joint': -1,
-        'constant': 0,
-        'angle': 0,
-    },
-    'place': {'weight of the place': 1, 'size': 1, 'gap': 0, 'wander': 0},
-    'dependence': {
-        'weight of the dependence': 1,
-        'rows': 0,
-        'constant': 0,
-        'angle': 0,
-        'wander': 0,
-    },
+    'name': _terms(
+        '+ gap, - instrument and base, - left unexplained, - structure, 0 rows, + joints moving, '
+        '0 stations, - lacking, - behind, - cancelling, + weight, + evidence, + size, '
+        '- faint beside others, - others of its curve, - part of a wave, - wander over size, '
+        '+ missed, + least missed, + shown beside others, - left at its joint, 0 constant, 0 angle'
+    ),
+    'place': _terms('+ weight of the place, + size, 0 gap, 0 wander'),
+    'dependence': _terms('+ weight of the dependence, 0 rows, 0 constant, 0 angle, 0 wander'),
     # A set with more names is likelier to hold the right one.
-    'name of many': {**MANY, 'low growth': 1, 'members': 1},
+    'name of many': {**MANY, **_terms('+ low growth, + members')},
     'place of many': MANY,
     'dependence of many': MANY,
-    'place of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},
-    'dependence of the rest': {**REST, 'gap': 0, 'rows': 0, 'stations': 0},
+    'place of the rest': REST,
+    'dependence of the rest': REST,
     'complete': {
-        'left': -1,
-        'left unexplained': -1,
-        'structure': -1,
-        'gap': 0,
-        'hardly a gap': 0,
+        **_terms('- left, - left unexplained, - structure, 0 gap, 0 hardly a gap'),
         **{f'told as {one}': 0 for one in TOLD_AS},
         **SUMMED,
     },
     'nameless': {name: -way for name, way in NAMED.items()},
-    'answer, named': {**NAMED, 'a wide set': -1, 'one faint beside others': -1},
+    'answer, named': {**NAMED, **_terms('- a wide set, - one faint beside others')},
     'answer, unknown': {
-        'gap': 0,
-        'left unexplained': 0,
-        'hardly a gap': 0,
-        'groups': 0,
-        'no group': 0,
-        'steady': 1,
-        'rows': 0,
-        'stations': 0,
-        'structure': 1,
-        'lacking': 1,
+        **_terms(
+            '0 gap, 0 left unexplained, 0 hardly a gap, 0 groups, 0 no group, + steady, 0 rows, '
+            '0 stations, + structure, + lacking'
+        ),
         **SUMMED,
     },
-    'answer, none': {'structure': -1, 'rows': 0, 'left': -1},
-    'answer, many': {'structure': -1, 'lacking': -1, 'gap': 0, 'least name': 1, 'told': 0},
+    'answer, none': _terms('- structure, 0 rows, - left'),
+    'answer, many': _terms('- structure, - lacking, 0 gap, + least name, 0 told'),
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""
 OF_FAMILIES = frozenset({'name', 'nameless'})
@@ -194,8 +156,6 @@ def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array
 
 
 class Bound(NamedTuple):
-    """A threshold, and what is known of it."""
-
     sure_from: float
     """Above 1 where no threshold keeps the risk: then nothing is told as sure."""
     wrong: int
@@ -304,11 +264,7 @@ class Table(NamedTuple):
 def learned(
     examples: Sequence[Example], card: Mapping[str, Any], risk: float = RISK
 ) -> dict[str, Any]:
-    """
-    Return the content of a file of weights; raises DataError where examples of a kind are too few.
-
-    card: seeds, engines and mix, to be kept with the weights.
-    """
+    """Return the content of a file of weights; raises DataError where examples of a kind are too few."""
     statements, parts = {}, {}
     numbers = Counter(example.kind for example in examples)
     for kind in TERMS:
@@ -392,25 +348,24 @@ def restated(examples: Sequence[Example]) -> list[Example]:
 
 def _of_kind(own: Sequence[Example], kind: str) -> tuple[dict[str, int], Table, Array]:
     """Return the features of a kind of statement, its examples, and which way each may count."""
-    terms = {**TERMS[kind], **(_families(own) if kind in OF_FAMILIES else {})}
+    terms = dict(TERMS[kind])
+    if kind in OF_FAMILIES:
+        named = Counter(
+            name for e in own for name in e.features if name.startswith(ONLY) and e.features[name]
+        )
+        terms |= {name: 0 for name in sorted(named) if named[name] >= FEWEST_NAMED}
     return terms, _table(own, list(terms)), np.array(list(terms.values()), float)
 
 
-def _families(examples: Sequence[Example]) -> dict[str, int]:
-    """Return the families named alone often enough to learn anything of them."""
-    named = Counter(
-        name for e in examples for name in e.features if name.startswith(ONLY) and e.features[name]
-    )
-    return {name: 0 for name in sorted(named) if named[name] >= FEWEST_NAMED}
-
-
 def count_of(content: Mapping[str, Any]) -> int:
-    """Return how many weights were learned, constants included."""
     return sum(1 + len(own['weights']) for own in content['statements'].values())
 
 
 def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
-    together = np.array([_together(e.case) for e in examples])
+    # Unseen together are a sealed case, or all rows of one real arm.
+    together = [e.case if '/' in e.case else e.case.split()[0] for e in examples]
+    each, of = np.unique(np.array(together), return_inverse=True)
+    orders = [np.random.default_rng(k).permutation(len(each)) for k in range(PARTITIONS)]
     values = [
         [e.features.get(name, 0.0 if name.startswith(ONLY) else np.nan) for name in names]
         for e in examples
@@ -419,20 +374,8 @@ def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
         np.array(values, float).reshape(len(examples), len(names)),
         np.array([e.right for e in examples], bool),
         np.array([e.weight for e in examples], float),
-        _parted(together),
+        np.array([order[of] % FOLDS for order in orders]),
     )
-
-
-def _parted(together: NDArray[np.str_]) -> Array:
-    """Return folds, (PARTITIONS, N), of examples that are unseen together with others, (N,)."""
-    each, of = np.unique(together, return_inverse=True)
-    orders = [np.random.default_rng(k).permutation(len(each)) for k in range(PARTITIONS)]
-    return np.array([order[of] % FOLDS for order in orders])
-
-
-def _together(case: str) -> str:
-    """Return what is unseen together: a sealed case, or all rows of one real arm."""
-    return case if '/' in case else case.split()[0]
 
 
 class Scaled(NamedTuple):
@@ -460,7 +403,6 @@ class Scaled(NamedTuple):
         return cls(low, high, np.nanmean(cut, axis=0), np.where(spread > 1e-9, spread, 1.0))
 
     def __call__(self, values: Array) -> Array:
-        """Return features as they enter."""
         cut = np.clip(values, self.low, self.high)
         return np.nan_to_num((cut - self.middle) / self.spread)
 

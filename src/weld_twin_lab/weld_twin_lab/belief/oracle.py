@@ -86,8 +86,7 @@ def certainty(seed: int, number: int, mix: str) -> float | None:
     seed, number, mix: of the case, as `trial.tried` takes them.
     """
     case = drawn(seed, number, mix).case
-    kinds = ('single', 'double', 'several')
-    if case.lot.kind not in kinds or not 1 <= len(case.causes) <= 2:
+    if case.lot.kind not in ('single', 'double', 'several') or not 1 <= len(case.causes) <= 2:
         return None
     rng = np.random.default_rng([seed, 5000 + number])
     return float(np.prod([of_one(case, k, mix, rng) for k in range(len(case.causes))]))
@@ -132,27 +131,20 @@ def _bench(case: SealedCase, k: int, rng: np.random.Generator) -> _Bench:
     y[:seen] += rng.standard_normal(seen)
     nuisance = np.array(columns).T if columns else np.zeros((whole.size, 0))
     count = 3 * len(record(cell, (), case.test, exact(cell.tracker)).position)
-    return _Bench(
-        cell,
-        takes,
-        seen,
-        slice(seen, seen + count),
-        y,
-        beside,
-        moved(cell, beside, takes),
-        nuisance,
-    )
+    sealed, without = slice(seen, seen + count), moved(cell, beside, takes)
+    return _Bench(cell, takes, seen, sealed, y, beside, without, nuisance)
 
 
 def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float) -> _Weighed | None:
     """Return the weight of another cause, ``ratio`` times the noise; None where it has none."""
-    whole = moved(bench.cell, [*bench.beside, cause], bench.takes)
-    if _one_number(cause):
+    whole, sizes = moved(bench.cell, [*bench.beside, cause], bench.takes), SIZES[cause['effect']]
+    one_number = len(sizes) == 1 and np.ndim(cause[sizes[0]]) == 0
+    if one_number and cause['effect'] not in TURNING:
         alone = (whole - bench.without)[:, None]
         if _solved(bench, bench.without, alone)[0] > best + HOPELESS:
             return None
-    sizes, own, weighed = _refined(bench, cause, whole)
-    growth = float(np.linalg.norm(own) / np.linalg.norm(sizes))
+    given, own, weighed = _refined(bench, cause, whole)
+    growth = float(np.linalg.norm(own) / np.linalg.norm(given))
     possible = STRATA[0][0] / WIDE < ratio * growth < STRATA[-1][1] * WIDE
     possible = possible and (_signed(cause) or own[0] >= 0.0)
     return weighed if possible and weighed.chi2 <= best + NEAR else None
@@ -174,14 +166,8 @@ def _refined(bench: _Bench, cause: Cause, whole: Array) -> tuple[Array, Array, _
 
 
 def _signed(cause: Cause) -> bool:
-    """Return whether a cause may point either way, or anywhere."""
     count = sum(np.size(cause[key]) for key in SIZES[cause['effect']] if key in cause)
     return CAUSES[cause['effect']].signed or count > 1
-
-
-def _one_number(cause: Cause) -> bool:
-    sizes = SIZES[cause['effect']]
-    return cause['effect'] not in TURNING and len(sizes) == 1 and np.ndim(cause[sizes[0]]) == 0
 
 
 def _scaled(cause: Cause, key: str) -> Array:
@@ -200,12 +186,8 @@ def _solved(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, 
     bare = columns[seen] - basis @ (basis.T @ columns[seen])
     sizes = np.maximum(np.linalg.svd(bare, compute_uv=False), 1e-3)
     volume = float(0.5 * sizes.size * log(2.0 * pi) - np.log(sizes).sum())
-    return (
-        float((residual[seen] ** 2).sum()),
-        step[: columns.shape[1]],
-        bench.y - residual,
-        volume,
-    )
+    chi2 = float((residual[seen] ** 2).sum())
+    return chi2, step[: columns.shape[1]], bench.y - residual, volume
 
 
 def _log_prior(case: SealedCase, family: str, mix: str) -> float:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from ..blind.scoring import (
     measured,
     share,
 )
-from ..study import Study, require_simulator, tabled
+from ..study import Study, require_simulator, shown, tabled
 from . import learning
 from .judged import Example, examples_of, kept
 from .learning import log_loss, unseen, upper_limit
@@ -186,13 +187,12 @@ def with_oracle(rows: Sequence[dict[str, Any]], runner: Runner) -> list[dict[str
 def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[str, Any]:
     """Return the content of the file of weights that rows of `judged.kept` teach."""
     own = [row for row in rows if row.get('examples')]
-    card = {
-        'cases': len(own),
-        'seeds': seeds_of(own),
-        'mixes': dict(Counter(str(row['mix']) for row in own)),
-        'mix': MIX,
-    }
-    return learning.learned(examples_of(own), card, risk)
+    return learning.learned(examples_of(own), {**_drawn(own), 'mix': MIX}, risk)
+
+
+def _drawn(rows: Sequence[Kept]) -> dict[str, Any]:
+    mixes = dict(Counter(str(row['mix']) for row in rows))
+    return {'cases': len(rows), 'seeds': seeds_of(rows), 'mixes': mixes}
 
 
 def judged(
@@ -218,9 +218,7 @@ def judged(
         'schema': 'weld_twin/belief_results/2',
         'learned_from': {**content['card'], 'weights': learning.count_of(content)},
         'judged_on': {
-            'cases': len(own),
-            'seeds': seeds_of(own),
-            'mixes': dict(Counter(str(row['mix']) for row in own)),
+            **_drawn(own),
             'unsound': [row['name'] for row in rows if row.get('unsound')],
             'failed': [row['name'] for row in rows if row['error']],
         },
@@ -261,25 +259,19 @@ def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def page(result: Mapping[str, Any]) -> str:
-    return '\n'.join(
-        [
-            *_bounds(result['learned_from'], result['judged_on']),
-            '',
-            tabled(STATEMENTS, result['statements'].items()),
-            'By chance: the calibration error that so many statements have where each is exactly right.',
-            '',
-            *(_beside_goals(result) if result['goals'] else ()),
-        ]
-    )
-
-
-def _beside_goals(result: Mapping[str, Any]) -> list[str]:
-    return [
-        'Beside the goals:',
+    parts = [
+        *_bounds(result['learned_from'], result['judged_on']),
         '',
-        measure_table(result['goals']),
-        *_failures(result['wrong_and_sure']),
+        tabled(STATEMENTS, result['statements'].items()),
+        'By chance: the calibration error that so many statements have where each is exactly right.',
+        '',
     ]
+    if result['goals']:
+        parts += ['Beside the goals:', '', measure_table(result['goals'])]
+        failed = result['wrong_and_sure']
+        parts += ['Sure and wrong:' if failed else 'No case was sure and wrong.', '']
+        parts += [tabled(FAILURES, failed)] if failed else []
+    return '\n'.join(parts)
 
 
 def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
@@ -298,40 +290,32 @@ def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
-    if not listed:
-        return ['No case was sure and wrong.', '']
-    return ['Sure and wrong:', '', tabled(FAILURES, listed)]
-
-
-def _percent(value: float) -> str:
-    return f'{100.0 * value:.1f} %'
-
-
 def _listed(values: Sequence[object]) -> str:
     return ', '.join(map(str, values))
 
 
+_percent = partial(shown, 1, by='{:.1f} %', times=100.0)
+_thousandths = partial(shown, 1, by='{:.3f}')
 BOUNDS: dict[str, Callable[[Any], object]] = {
     'statement': lambda row: row[0],
-    'number': lambda row: f'{row[1]["cases"]:.0f}',
+    'number': shown(1, 'cases', by='{:.0f}'),
     'sure from': lambda row: (
         'never: too few cases' if row[1]['sure_from'] > 1.0 else f'{row[1]["sure_from"]:.3f}'
     ),
-    'sure': lambda row: _percent(row[1]['sure']),
-    'of these wrong': lambda row: f'{row[1]["wrong"]:.0f}',
+    'sure': _percent('sure'),
+    'of these wrong': shown(1, 'wrong', by='{:.0f}'),
 }
 """Columns of the table of bounds, each a name and its bound."""
 STATEMENTS: dict[str, Callable[[Any], object]] = {
     'statements': lambda row: row[0],
-    'number': lambda row: row[1]['statements'],
-    'right': lambda row: _percent(row[1]['right'] / row[1]['statements']),
-    'calibration error': lambda row: f'{row[1]["ece"]["value"]:.3f}',
-    'by chance': lambda row: f'{row[1]["ece_by_chance"]:.3f}',
-    'log loss': lambda row: f'{row[1]["log_loss"]:.3f}',
-    'sure': lambda row: _percent(row[1]['sure']['value']),
-    'sure and wrong': lambda row: row[1]['sure_and_wrong'],
-    'wrong among the surest 70 %': lambda row: _percent(row[1]['wrong_at_70']),
+    'number': shown(1, 'statements'),
+    'right': lambda row: f'{100.0 * row[1]["right"] / row[1]["statements"]:.1f} %',
+    'calibration error': _thousandths('ece', 'value'),
+    'by chance': _thousandths('ece_by_chance'),
+    'log loss': _thousandths('log_loss'),
+    'sure': _percent('sure', 'value'),
+    'sure and wrong': shown(1, 'sure_and_wrong'),
+    'wrong among the surest 70 %': _percent('wrong_at_70'),
 }
 """The same of kinds of statements."""
 FAILURES: dict[str, Callable[[Any], object]] = {

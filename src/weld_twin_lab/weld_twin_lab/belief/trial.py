@@ -110,12 +110,11 @@ def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
     if mix == SEVERAL:
         return _of_several(seed, number)
     if mix == EVERYWHERE:
-        return _of_everywhere(seed, number)
+        return _off_everywhere(number, np.random.default_rng([seed, 4000 + number]))
     if mix == FOREIGN:
         return _with_foreign(seed, number)
     lot = mixed(seed, number + 1)[number]
-    ways = Deck(POOR, seed, 60)
-    poor = [ways.next() for _ in range(number + 1)][number]
+    poor = Deck(POOR, seed, 60).nth(number)
     if 'equal lag' in lot.families or (poor == 'few' and lot.motion != 'stations'):
         poor = ''
     rng = np.random.default_rng([seed, 2000 + number])
@@ -136,11 +135,6 @@ def _of_several(seed: int, number: int) -> Drawn:
         case = replace(case, excluded=(str(rng.choice(lot.families)),))
     given = number % HELD_OUT == HELD_OUT - 1 and not case.also
     return Drawn(replace(case, holdout=holdout), held_out=given)
-
-
-def _of_everywhere(seed: int, number: int) -> Drawn:
-    rng = np.random.default_rng([seed, 4000 + number])
-    return _off_everywhere(number, rng)
 
 
 def _with_foreign(seed: int, number: int) -> Drawn:
@@ -188,11 +182,9 @@ def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:
     cards = [name for name in (*COMMON * (OFTEN - 1), *FAMILIES) if name not in still | fitted]
     families = _families(cards, count, rng)
     withheld = (number // MOST) % WITHHELD == WITHHELD - 1
-    robots = Deck(ROBOTS, seed, 71)
-    robot = [robots.next() for _ in range(number + 1)][number]
     return Lot(
         'withheld' if withheld else 'several',
-        robot,
+        Deck(ROBOTS, seed, 71).nth(number),
         motion,
         families,
         tuple(int(rng.choice(STRATA)) for _ in range(count)),
@@ -313,7 +305,7 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
         as_recording(f'{seal.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
         for k, taken in enumerate((*case.also, *more))
     ]
-    return [_recorded(case, seal.TRAIN), *also]
+    return [case.recorded(seal.TRAIN), *also]
 
 
 def diagnosed(
@@ -327,24 +319,18 @@ def diagnosed(
         align=frozenset(cell.align),
         known=effects_from_list([dict(item) for item in cell.known], cell.robot),
         exclude=case.excluded,
-        holdout=[_recorded(case, seal.HOLDOUT)] if held_out else [],
+        holdout=[case.recorded(seal.HOLDOUT)] if held_out else [],
         experiment=False,
     )
-
-
-def _recorded(case: SealedCase, use: str) -> Recording:
-    taken = {seal.TRAIN: case.train, seal.HOLDOUT: case.holdout, seal.TEST: case.test}[use]
-    return as_recording(use, record(case.cell, case.causes, taken))
 
 
 def _sealed(case: SealedCase, truth: dict[str, Any], diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what is left on the recording that the diagnosis never saw, RMS [m]."""
     if diagnosis.status == 'unsound':
         return {}
-    test = _recorded(case, seal.TEST)
+    test, cell = case.recorded(seal.TEST), case.cell
     good = counted(test, truth['outliers'])
-    cell, train = case.cell, _recorded(case, seal.TRAIN)
-    bare = nominal_on(cell.robot, diagnosis.model.known, train, cell.align)
+    bare = nominal_on(cell.robot, diagnosis.model.known, case.recorded(seal.TRAIN), cell.align)
 
     def remaining(model: Model) -> float:
         return rms(gap_on(model, test)[good])
@@ -361,24 +347,13 @@ def _members(diagnosis: Diagnosis, remaining: Any) -> list[list[dict[str, Any]]]
     """Return what each member of every set leaves in its place, the rest as it is."""
     if not isinstance(diagnosis.evidence, Evidence) or diagnosis.families:
         return []
-    by_site = {
-        r.site: r for candidate_set in diagnosis.evidence.candidate_sets for r in candidate_set
-    }
-    out = []
-    for group in diagnosis.indistinguishable:
-        alternatives: Sequence[Alternative] = [by_site[site] for site in group if site in by_site]
-        out.append(
-            [
-                {
-                    'effect': r.site.effect,
-                    'joint': r.site.joint,
-                    'left': remaining(
-                        replace(
-                            r.fit.model, bases=r.fit.model.bases[:1], known=diagnosis.model.known
-                        )
-                    ),
-                }
-                for r in alternatives
-            ]
-        )
-    return out
+    by_site = {r.site: r for each in diagnosis.evidence.candidate_sets for r in each}
+
+    def member(r: Alternative) -> dict[str, Any]:
+        own = replace(r.fit.model, bases=r.fit.model.bases[:1], known=diagnosis.model.known)
+        return {'effect': r.site.effect, 'joint': r.site.joint, 'left': remaining(own)}
+
+    return [
+        [member(by_site[site]) for site in group if site in by_site]
+        for group in diagnosis.indistinguishable
+    ]

@@ -51,13 +51,6 @@ EXACT = 1e-12
 """Difference [m or rad] that rounding may leave between two ways to the same number."""
 
 
-def batches(robot: Robot, peers: dict[str, Peer], count: int) -> Iterator[Workload]:
-    """Yield the workloads of many joint positions."""
-    yield _poses(robot, peers, count)
-    yield _jacobians(robot, peers, count)
-    yield _derivatives(robot, peers, count)
-
-
 def single(robot: Robot, peers: dict[str, Peer]) -> Workload:
     """Return the workload of one pose at a time, as a node has it."""
     q = random_positions(robot, 500, seed=2)
@@ -241,13 +234,7 @@ QUICK = Effort(3, 0.01, (1000,), 100)
 
 
 def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
-    """
-    Run everything; write the results.
-
-    They are ``benchmark.json`` and two tables of it, ``benchmark.md`` and ``brief.md``.
-
-    Raises DataError: a contender's result is not that of the others.
-    """
+    """Run everything, and write benchmark.json and two tables; raises DataError where results differ."""
     robot = calibrated_arm()
     peers, missing = find_peers(robot)
     for name, reason in missing.items():
@@ -271,7 +258,9 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
 def _workloads(effort: Effort, peers: dict[str, Peer]) -> Iterator[Workload]:
     robot = calibrated_arm()
     for count in effort.counts:
-        yield from batches(robot, peers, count)
+        yield _poses(robot, peers, count)
+        yield _jacobians(robot, peers, count)
+        yield _derivatives(robot, peers, count)
     yield single(robot, peers)
     yield inverse(effort.points, 'pinocchio' in peers)
 

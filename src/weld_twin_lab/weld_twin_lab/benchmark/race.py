@@ -15,6 +15,7 @@ from time import process_time
 from typing import IO, Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
@@ -56,23 +57,16 @@ def smooth_motion(arm: Robot, count: int) -> Array:
 
 def links(robot: Robot) -> list[Array]:
     """Return the constant transforms between joint axes, for ``links[0] Rz(q0) links[1] ...``."""
+
+    def screw(axis: str, angle: float, along: float) -> Array:
+        turn = Rotation.from_euler(axis, angle).as_matrix()
+        return transform(turn, along * np.eye(3)['xyz'.index(axis)])
+
+    rows = zip(robot.theta, robot.d, robot.alpha, robot.a, strict=True)
     out = [np.array(robot.T_world_base)]
-    for i in range(robot.n):
-        out.append(turn_z(robot.theta[i], robot.d[i]) @ turn_x(robot.alpha[i], robot.a[i]))
+    out += [screw('z', theta, d) @ screw('x', alpha, a) for theta, d, alpha, a in rows]
     out[-1] = out[-1] @ robot.T_flange_tool
     return out
-
-
-def turn_z(angle: float, along: float) -> Array:
-    """Return Rz(angle) Tz(along), shape (4, 4)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, along], [0, 0, 0, 1.0]])
-
-
-def turn_x(angle: float, along: float) -> Array:
-    """Return Rx(angle) Tx(along), shape (4, 4)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0, along], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
 
 
 _SMALL = Path(__file__).with_name('small_parent.py')
@@ -125,8 +119,6 @@ OWN, REFERENCE = 'weld_twin', 'pinocchio'
 
 @dataclass(frozen=True)
 class Contender:
-    """One way to do a job."""
-
     name: str
     run: Callable[[], object]
     items: int = 1
@@ -219,7 +211,6 @@ LEFT_OUT = 'N = 1,000'
 
 
 def lines(outcome: Outcome) -> Iterator[str]:
-    """Yield a line for the workload and one for each contender."""
     load = outcome.workload
     yield f'{load.title} (per {load.item}; times: {REFERENCE} / contender)'
     for contender in load.contenders:
@@ -234,20 +225,14 @@ def page(outcomes: list[Outcome]) -> str:
     rows = [('workload', 'time', 'times as fast as', 'and as the others')]
     for outcome in outcomes:
         load = outcome.workload
-        own = outcome.seconds[OWN]
-        others = [
-            f'{c.name} {short(np.median(outcome.seconds[c.name]) / np.median(own))}'
+        seconds = {name: float(np.median(own)) for name, own in outcome.seconds.items()}
+        others = ', '.join(
+            f'{c.name} {short(seconds[c.name] / seconds[OWN])}'
             for c in load.contenders
             if c.name not in (OWN, REFERENCE)
-        ]
-        rows.append(
-            (
-                load.title,
-                f'{duration(float(np.median(own)))} per {load.item}',
-                f'{REFERENCE}: **{times(outcome, OWN)}**',
-                ', '.join(others),
-            )
         )
+        time = f'{duration(seconds[OWN])} per {load.item}'
+        rows.append((load.title, time, f'{REFERENCE}: **{times(outcome, OWN)}**', others))
     return markdown.table(*rows)
 
 

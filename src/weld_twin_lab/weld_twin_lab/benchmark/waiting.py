@@ -122,9 +122,7 @@ def measured(
     """
     Return what every job costs, here and in another checkout with an environment of its own, in turn.
 
-    out: gets the data and, for a moment, what the commands write.
-    runs: pairs of runs after one to warm up; jobs that take long are run once.
-    only: parts of the names of jobs; empty for all.
+    runs: pairs of runs after one to warm up.
 
     Raises DataError: there is no environment in ``base``, no such job, or a command fails here.
     """
@@ -195,7 +193,6 @@ def _entry(job: WaitingJob, pythons: dict[str, str], out: Path, runs: int) -> En
 
 
 def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
-    """Return what one command costs; None where it fails."""
     shutil.rmtree(written, ignore_errors=True)
     filled = [word.replace('{data}', str(place)).replace('{out}', str(written)) for word in words]
     # An installed program is compiled once, whatever the shell of this run says of that.

@@ -78,17 +78,13 @@ def working_posture(robot: Robot) -> Array:
     bare = robot.with_frames(tool=np.eye(4))
     key = json.dumps(bare.to_mapping())
     if key not in _POSTURES:
-        _POSTURES[key] = _posture(bare)
+        q = plan(bare, bundled_seam(bare, 'line'), 'smooth', 10.0, fit=True).motion.q
+        _POSTURES[key] = np.asarray(q[len(q) // 2])
     return np.array(_POSTURES[key])
 
 
 _POSTURES: dict[str, Array] = {}
 """By what robots say of themselves: every case has an object of its own."""
-
-
-def _posture(bare: Robot) -> Array:
-    q = plan(bare, bundled_seam(bare, 'line'), 'smooth', 10.0, fit=True).motion.q
-    return np.asarray(q[len(q) // 2])
 
 
 def _seam(kind: str, pose: Array, size: float, rng: np.random.Generator) -> Path:
@@ -176,7 +172,6 @@ def _free(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
 
 
 def _stations(robot: Robot, span: float, rng: np.random.Generator) -> Motion:
-    """Return stations scattered over the working space."""
     count = max(int(2.5 * span), 40)
     spread = np.minimum(0.4 * (robot.upper - robot.lower), 1.2)
     q = working_posture(robot) + rng.uniform(-1.0, 1.0, (count, robot.n)) * spread
@@ -209,8 +204,6 @@ GROSS = 6.0
 
 @dataclass(frozen=True, eq=False)
 class BlindCell:
-    """One cell with its instruments."""
-
     robot: Robot
     tracker: Tracker
     known: tuple[Cause, ...] = ()
@@ -263,11 +256,7 @@ def draw_cell(
 
 
 def fitted_out(cell: BlindCell, align: tuple[str, ...] | None, noise_m: float | None) -> BlindCell:
-    """
-    Return a cell with other frames to be fitted, and an instrument of another noise.
-
-    noise_m: RMS length [m].
-    """
+    """Return a cell with other frames to fit, and an instrument of another noise, RMS length [m]."""
     if align is not None:
         cell = replace(cell, align=align)
     if noise_m is not None:
@@ -296,7 +285,6 @@ def _far(rng: np.random.Generator) -> Array:
 
 
 def _torch(rng: np.random.Generator) -> Array:
-    """Return a torch frame on the flange, shape (4, 4)."""
     tool = np.eye(4)
     tool[:3, :3] = Rotation.from_euler('y', rng.uniform(0.2, 0.8)).as_matrix()
     tool[:3, 3] = [rng.uniform(0.0, 0.12), rng.uniform(-0.03, 0.03), rng.uniform(0.1, 0.35)]

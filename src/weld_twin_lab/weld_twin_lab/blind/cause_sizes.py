@@ -87,7 +87,6 @@ def machines(robot: Robot, cause: Mapping[str, Any], key: str) -> float:
 
 
 def scaled(cause: Mapping[str, Any], factor: float) -> Cause:
-    """Return a cause that is so many times as large."""
     out = dict(cause)
     for key in SIZES[cause['effect']]:
         if key in out:
@@ -122,8 +121,6 @@ Drawn = Callable[[Here], Any]
 
 
 class Typical(NamedTuple):
-    """A cause of its typical size."""
-
     draw: Drawn
     """Returns the cause without its name."""
     sizes: tuple[str, ...]
@@ -320,7 +317,6 @@ class Construction(NamedTuple):
 
 
 def construct(name: str, robot: Robot, span: float, rng: np.random.Generator) -> Construction:
-    """Return an ambiguous construction of its typical size."""
     return CONSTRUCTIONS[name](robot, span, rng)
 
 
@@ -438,7 +434,6 @@ def rough_gears(robot: Robot, rng: np.random.Generator) -> list[Cause]:
 
 
 def _wave(joint: str, order: int, amplitude: float, rng: np.random.Generator) -> Cause:
-    """Return one order of a gear's ripple, at any phase."""
     phase = float(rng.uniform(-np.pi, np.pi))
     waves = {'order': order, 'amplitude': amplitude, 'phase': phase}
     return {'effect': 'transmission_ripple', 'joint': joint, **waves}

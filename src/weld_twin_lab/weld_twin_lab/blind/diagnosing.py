@@ -39,7 +39,6 @@ def diagnose_cases(
     """
     Diagnose all cases, write what was said, and return it case by case.
 
-    runner: its store makes the work resumable; verdicts of other cases are not taken for these.
     with_holdout: judge the shrink on the held-out recording, not on stretches of the training's.
 
     Raises DataError: truths lie within reach and may not, or the directory holds no cases.

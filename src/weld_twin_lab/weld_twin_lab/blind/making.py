@@ -32,6 +32,7 @@ from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..plant.lost_motion import FLANK_TORQUE
+from ..plant.tracker import Tracker
 from . import seal
 from .blind_cell import (
     SPANS,
@@ -75,19 +76,8 @@ KINDS = {
 """Kinds of cases, and how many of 40 are of each."""
 STRATA = ((0.3, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, 40.0))
 """Effect RMS over measurement noise."""
-_STRATUM = {
-    'single': (0, 1, 1, 2, 2, 3),
-    'double': (1, 2, 2, 3),
-    'triple': (1, 2, 2, 3),
-    'outside': (1, 2, 2, 3),
-    'withheld': (1, 2, 2, 3),
-    'ambiguous': (1, 2, 2, 3),
-    'none': (0,),
-}
-"""
-Number of the stratum of each case of a kind, dealt like cards: each comes as often as it stands
-here.
-"""
+_STRATUM = dict.fromkeys(KINDS, (1, 2, 2, 3)) | {'single': (0, 1, 1, 2, 2, 3), 'none': (0,)}
+"""Number of the stratum of each case of a kind, dealt like cards, each as often as it stands here."""
 _COUNT = {'double': 2, 'triple': 3, 'none': 0}
 """Causes of a case; one where the kind is not named."""
 ROBOTS = (
@@ -104,8 +94,6 @@ MOTIONS = ('seams', 'free', 'free', 'stations')
 
 @dataclass(frozen=True)
 class Lot:
-    """What a case is to be."""
-
     kind: str
     robot: str
     motion: str
@@ -126,15 +114,7 @@ def lots(
     constructions: Sequence[str] = ('',),
     shares: Mapping[str, int] = KINDS,
 ) -> list[Lot]:
-    """
-    Return what the first cases of a seed are to be.
-
-    kinds: only these; empty for all.
-    constructions: names of the ambiguous constructions.
-    shares: how often each kind comes.
-
-    Raises DataError: an unknown kind, or no cases asked for.
-    """
+    """Return what the first cases of a seed are to be; raises DataError of another kind, or of none."""
     for kind in kinds:
         if kind not in KINDS:
             raise DataError(f'there are no cases of kind {kind!r}; kinds are ' + ', '.join(KINDS))
@@ -176,8 +156,11 @@ class Deck(Generic[Card]):
             self._left = [self._cards[k] for k in self._rng.permutation(len(self._cards))]
         return self._left.pop()
 
+    def nth(self, number: int) -> Card:
+        """Return the card dealt after so many others."""
+        return [self.next() for _ in range(number + 1)][number]
+
     def several(self, count: int) -> tuple[Card, ...]:
-        """Return so many different cards."""
         out: list[Card] = []
         while len(out) < count:
             card = self.next()
@@ -279,8 +262,6 @@ DECOY = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SealedCase:
-    """One case, all of it."""
-
     lot: Lot
     cell: BlindCell
     causes: list[Cause]
@@ -297,6 +278,10 @@ class SealedCase:
     """Whether hold-out and test are other motions than the training's."""
     also: tuple[Take, ...] = ()
     """Further recordings to be diagnosed with the training's."""
+
+    def recorded(self, use: str, tracker: Tracker | None = None) -> Recording:
+        """Return the recording for a use, 'train', 'holdout' or 'test', by its instrument or another."""
+        return as_recording(use, record(self.cell, self.causes, getattr(self, use), tracker))
 
     def told(self, name: str) -> dict[str, Any]:
         """Return what it is judged by, in plain values."""
@@ -323,10 +308,6 @@ def make(
 ) -> str:
     """
     Make cases and truths, and return the seal; what the same request made already stays.
-
-    cases, truths: directories; the truths hold the seed, which is a truth as well.
-    kinds: only these kinds of cases; empty for all.
-    spans: shortest and longest recording [s].
 
     Raises DataError: the directories hold other cases, or the numbers make no sense.
     """
@@ -387,12 +368,9 @@ def draw_case(
     lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS, poor: str = ''
 ) -> SealedCase:
     """
-    Return a case that shows its causes as large as the lot wants them.
+    Return a case that shows its causes as large as the lot wants them, or a DataError.
 
-    spans: shortest and longest recording [s].
     poor: how the motion diagnosed is made poor, as `blind_cell.poorer` takes it.
-
-    Raises DataError: no cell and motion drawn shows them.
     """
     reason: Exception = NotVisible(lot.kind)
     for attempt in range(TRIES):
@@ -491,25 +469,15 @@ def write_case(place: Path, name: str, case: SealedCase) -> None:
     write_robot_yaml(place / seal.ROBOT, cell.robot)
     if cell.known:
         write_text(place / seal.KNOWN, yaml_text([dict(item) for item in cell.known]))
-    for use, taken in ((seal.TRAIN, case.train), (seal.HOLDOUT, case.holdout)):
-        made = as_recording(use, record(cell, case.causes, taken))
-        write_recording(place / use, made, cell.robot)
-    seal.write(
-        place / seal.CASE,
-        {
-            'name': name,
-            'align': list(cell.align),
-            'exclude': list(case.excluded),
-            'known': bool(cell.known),
-        },
-    )
+    for use in (seal.TRAIN, seal.HOLDOUT):
+        write_recording(place / use, case.recorded(use), cell.robot)
+    about: dict[str, Any] = {'name': name, 'align': [*cell.align], 'exclude': [*case.excluded]}
+    seal.write(place / seal.CASE, {**about, 'known': bool(cell.known)})
 
 
 def write_truth(place: Path, name: str, case: SealedCase) -> None:
     """Write what is sealed: the causes, and the recording that no diagnosis sees."""
-    cell = case.cell
-    tested = record(cell, case.causes, case.test)
-    write_recording(place / seal.TEST, as_recording(seal.TEST, tested), cell.robot)
+    write_recording(place / seal.TEST, case.recorded(seal.TEST), case.cell.robot)
     seal.write(place / seal.TRUTH, {'salt': secrets.token_hex(16), **truth_of(name, case)})
 
 

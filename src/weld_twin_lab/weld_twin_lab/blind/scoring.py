@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,11 +36,18 @@ from .cause_sizes import Site
 
 def rigid(points: Array, off: Array) -> Array:
     """Return the part of a displacement (M, 3) that a moved base explains."""
-    centred = points - points.mean(axis=0)
-    turn = [np.cross(axis, centred) for axis in np.eye(3)]
-    columns = [column.ravel() for column in turn]
-    columns += [np.tile(axis, len(points)) for axis in np.eye(3)]
-    design = np.stack(columns, axis=1)
+    return explained(moves_of(points - points.mean(axis=0)), off)
+
+
+def moves_of(points: Array) -> list[Array]:
+    """Return how points (M, 3) move where they turn about, and are shifted along, each axis."""
+    shifts = [np.tile(axis, (len(points), 1)) for axis in np.eye(3)]
+    return [*(np.cross(axis, points) for axis in np.eye(3)), *shifts]
+
+
+def explained(ways: Sequence[Array], off: Array) -> Array:
+    """Return the part of a displacement (M, 3) that ways of its shape explain."""
+    design = np.stack([way.ravel() for way in ways], axis=1)
     fitted, *_ = np.linalg.lstsq(design, off.ravel(), rcond=None)
     return np.asarray((design @ fitted).reshape(off.shape))
 
@@ -110,14 +116,12 @@ class Estimate(NamedTuple):
     cases: int
 
     def __str__(self) -> str:
-        """Return it in words."""
         if self.value is None:
             return 'none'
         return f'{self.value:.3f} ({self.low:.3f} to {self.high:.3f}; {self.cases})'
 
 
 def share(hits: Sequence[bool]) -> Estimate:
-    """Return a share with its Wilson score interval."""
     n, right = len(hits), sum(map(bool, hits))
     if n == 0:
         return Estimate(None, None, None, 0)
@@ -175,8 +179,6 @@ REACHED = {None: '', True: 'yes', False: 'no'}
 
 @dataclass(frozen=True)
 class Measure:
-    """One number over many cases."""
-
     key: str
     title: str
     estimate: Estimate
@@ -221,8 +223,6 @@ def _row(item: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 class Question(NamedTuple):
-    """What is asked of some of the cases."""
-
     key: str
     title: str
     asked: Callable[[Any], bool]
@@ -254,8 +254,6 @@ NAMED = {'station_step': 'instrument_knock'}
 
 @dataclass(frozen=True)
 class Judged:
-    """What a verdict was worth."""
-
     name: str
     kind: str
     robot: str
@@ -294,9 +292,11 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         for group in verdict.get('indistinguishable', ())
     ]
     answers = answers_of(truth)
-    answer = min(answers, key=lambda at: (-_share(at, groups), abs(len(groups) - len(at))))
-    matched = _matched(answer, groups)
-    whole = matched == len(answer)
+    answer = min(
+        answers,
+        key=lambda at: (-_matched(at, groups) / max(len(at), 1), abs(len(groups) - len(at))),
+    )
+    whole = _matched(answer, groups) == len(answer)
     kind = str(truth['kind'])
     exact = whole and len(groups) == len(answer)
     return Judged(
@@ -304,8 +304,8 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         kind,
         truth['robot'],
         truth['motion'],
-        _in_words(truth['sites']),
-        _said(groups),
+        in_words(truth['sites']) or 'nothing',
+        ' + '.join(in_words(sorted(group, key=str), ' or ') for group in groups),
         status,
         float(verdict.get('confidence') or 0.0),
         is_sure(verdict),
@@ -326,20 +326,12 @@ def is_sure(verdict: Mapping[str, Any]) -> bool:
     return float(verdict.get('confidence') or 0.0) > CONFIDENT if sure is None else bool(sure)
 
 
-def _sites(items: Iterable[Sequence[Any]]) -> list[Site]:
-    return [(NAMED.get(str(item[0]), str(item[0])), item[1]) for item in items]
-
-
 def _matched(answer: Sequence[Site], groups: Sequence[set[Site]]) -> int:
     """Return how many causes have a set of their own that holds them."""
     if not answer or not groups:
         return 0
     contained = np.array([[at in group for group in groups] for at in answer], dtype=float)
     return int(contained[linear_sum_assignment(-contained)].sum())
-
-
-def _share(answer: Sequence[Site], groups: Sequence[set[Site]]) -> float:
-    return _matched(answer, groups) / max(len(answer), 1)
 
 
 def _right(kind: str, status: str, exact: bool) -> bool:
@@ -354,16 +346,12 @@ def _right(kind: str, status: str, exact: bool) -> bool:
 
 def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
     """Return every list of sites that is as right as a truth, by the library's names."""
-    return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
+    answers = (truth['sites'], *truth['alike'])
+    return [[(NAMED.get(str(e), str(e)), joint) for e, joint in answer] for answer in answers]
 
 
-def _in_words(sites: Iterable[Sequence[Any]]) -> str:
-    return ' + '.join(' of '.join(filter(None, at)) for at in sites) or 'nothing'
-
-
-def _said(groups: Sequence[set[Site]]) -> str:
-    listed = (sorted(group, key=str) for group in groups)
-    return ' + '.join(' or '.join(_in_words([at]) for at in group) for group in listed)
+def in_words(sites: Iterable[Sequence[Any]], between: str = ' + ') -> str:
+    return between.join(' of '.join(filter(None, at)) for at in sites)
 
 
 MIB = 1 << 20
@@ -380,15 +368,12 @@ KINDS = {
 """Kinds of cases in words."""
 
 
-def _is(kind: str, case: Judged) -> bool:
-    return case.kind == kind
+def _right_of(kind: str, words: str) -> Question:
+    return Question(kind, f'{words}: right', lambda case: case.kind == kind, attrgetter('right'))
 
 
 QUESTIONS = (
-    *(
-        Question(kind, f'{words}: right', partial(_is, kind), attrgetter('right'))
-        for kind, words in KINDS.items()
-    ),
+    *(_right_of(kind, words) for kind, words in KINDS.items()),
     Question(
         'confident_wrong',
         'sure and wrong',
@@ -405,7 +390,6 @@ def score(cases: Path, truths: Path, results: Path, *, seal_given: str = '') -> 
     """
     Return the score of verdicts in plain values.
 
-    cases, truths, results: as `make` and `diagnose_cases` wrote them.
     seal_given: the seal as printed before the diagnosis; left out, the one stored holds.
 
     Raises DataError: a case or truth was changed, or the verdicts are on other cases.

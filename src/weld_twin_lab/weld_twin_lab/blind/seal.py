@@ -101,8 +101,6 @@ def opened(cases: Path, truths: Path, seal: str = '') -> list[dict[str, Any]]:
     Return the truths, in the order of the cases, once every hash has been found as committed.
 
     seal: as printed when the cases were made; left out, the one stored with the cases holds.
-
-    Raises DataError: a case or a truth is not what it was when the seal was made.
     """
     listed = read(cases / CASES)
     entries = listed['cases']

@@ -57,7 +57,6 @@ def _made(study: Study, cases: Path, truths: Path) -> None:
 
 
 def _scored(study: Study, cases: Path, truths: Path, results: Path, seal: str = '') -> None:
-    """Score, write, and print the measures."""
     from .scoring import page, score
 
     result = score(cases, truths, results, seal_given=seal)

@@ -67,8 +67,6 @@ PATHS = (
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of file."""
-
     suffix: str
     kind: str
     """Of the file's name, and how it may be changed."""
@@ -174,7 +172,6 @@ def _read_bag(path: Path) -> Any:
 
 
 def _read_listed(path: Path, storage: bytes) -> Any:
-    """Read a bag whose metadata is not right."""
     folder = path.with_name('listed')
     folder.mkdir(exist_ok=True)
     try:

@@ -22,7 +22,6 @@ import numpy as np
 from rclpy.action import ActionClient
 
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.recording import JointMotion, Recording
@@ -40,7 +39,7 @@ from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.controller import Controller
 from weld_twin_nodes.offline.correcting import program_model
 
-from ..study import tabled
+from ..study import shown, tabled
 from . import write_result
 from .drawn_cells import (
     CHANGES,
@@ -84,8 +83,6 @@ LIMITS = GoalLimits(acceleration=20.0)
 
 
 class CellTrial:
-    """A cell that goals are sent to."""
-
     def __init__(
         self, cell: Cell, folder: Path, arm: Arm, models: tuple[Learned, Learned | None]
     ) -> None:
@@ -238,7 +235,11 @@ class CellTrial:
             acting = ({'effect': 'time_delay', 'delay': JUMP},)
             self._late = round(JUMP * 1e9)
         elif what == 'load changed':
-            acting = _load(self.robot)
+            # A torch of another weight bends the shoulder and the elbow.
+            bent = zip(self.robot.joint_names[1:3], (4e-4, -5e-4), strict=True)
+            acting = tuple(
+                {'effect': 'joint_offset', 'joint': at, 'offset': by} for at, by in bent
+            )
         self._inject(*acting, noise)
         begun = time.monotonic()
         if what == 'tracker lost':
@@ -275,12 +276,6 @@ class CellTrial:
         for node in ('forward_kinematics_twin', 'compensator'):
             answer = self.cell.trigger(f'/{node}/reload')
             assert answer.success, answer.message
-
-
-def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
-    """Return what a torch of another weight does: it bends the shoulder and the elbow."""
-    bent = zip(robot.joint_names[1:3], (4e-4, -5e-4), strict=True)
-    return tuple({'effect': 'joint_offset', 'joint': at, 'offset': by} for at, by in bent)
 
 
 def tried(
@@ -429,7 +424,6 @@ def _made(args: Given, known: Known, other: str) -> dict[str, Any]:
 
 
 def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
-    """Return the arms that lack a change, or some of their goals."""
     changed = {change['robot'] for change in known.changes if change['change'] == CHANGES[-1]}
     return [
         arm
@@ -458,12 +452,10 @@ def _in_words(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def worse(row: dict[str, Any]) -> bool:
-    """Return whether a goal came out farther off than it was."""
     return bool(row['after_m'] > row['before_m'] + max(WORSE[0], WORSE[1] * row['before_m']))
 
 
 def worth(row: dict[str, Any]) -> bool:
-    """Return whether a goal is among those to be corrected."""
     return bool(row['inside'] and row['best_m'] <= (1.0 - WORTH) * row['before_m'])
 
 
@@ -488,7 +480,6 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return what goals come to."""
     done = [row for row in rows if row['verdict'] == 'corrected']
     bound = [row for row in done if row['bound_m'] is not None]
     to_do = [row for row in rows if worth(row)]
@@ -518,7 +509,6 @@ def summary(
     other: str,
     without: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:
-    """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
     unchanged = [c for c in changes if c['change'] == NOTHING]
     totals, beside = counted(calm), counted(without)
@@ -557,13 +547,12 @@ def _counted_by(key: str, rows: Sequence[dict[str, Any]]) -> dict[str, dict[str,
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return the tables of the page: the arms, and the changes."""
-    arms = [*result['robots'].items(), ('all', result['totals'])]
-    lines = [tabled(COLUMNS, arms), _changes(result)]
-    more = result['without_cell']
-    if more and more['robots']:
-        lines.append(tabled(COLUMNS, [*more['robots'].items(), ('all', more['totals'])]))
-    return '\n\n'.join([*lines, _spread(result)])
+    parts = [
+        tabled(COLUMNS, [*part['robots'].items(), ('all', part['totals'])])
+        for part in (result, result['without_cell'])
+        if part is result or (part and part['robots'])
+    ]
+    return '\n\n'.join([parts[0], _changes(result), *parts[1:], _spread(result)])
 
 
 def _spread(result: dict[str, Any]) -> str:
@@ -578,16 +567,13 @@ def _spread(result: dict[str, Any]) -> str:
     )
 
 
-def _millimetres(key: str) -> Callable[[Any], str]:
-    """Return what tells the median of a distance [mm]; nothing where there is none."""
-
-    def in_words(row: Any) -> str:
-        value = row[1]['median'][key]
-        return '' if value is None else f'{value * 1e3:.4f}'
-
-    return in_words
-
-
+DISTANCES = {
+    'before, mm': 'before_m',
+    'after': 'after_m',
+    'true causes': 'best_m',
+    'at most': 'worst_m',
+    'bound reported': 'bound_m',
+}
 COLUMNS: dict[str, Callable[[Any], object]] = {
     'arm': lambda row: row[0],
     'goals': lambda row: row[1]['goals'],
@@ -599,11 +585,7 @@ COLUMNS: dict[str, Callable[[Any], object]] = {
         f'{row[1]["outside"] - row[1]["outside_corrected"]} of {row[1]["outside"]}'
     ),
     'worse': lambda row: row[1]['worse'],
-    'before, mm': _millimetres('before_m'),
-    'after': _millimetres('after_m'),
-    'true causes': _millimetres('best_m'),
-    'at most': _millimetres('worst_m'),
-    'bound reported': _millimetres('bound_m'),
+    **{words: shown(1, 'median', key, by='{:.4f}', times=1e3) for words, key in DISTANCES.items()},
     'within it': lambda row: f'{row[1]["held"]} of {row[1]["bounds"]}',
 }
 """Columns of the tables of arms, each a name and what its goals come to."""

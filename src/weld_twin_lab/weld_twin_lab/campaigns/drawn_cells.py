@@ -59,8 +59,6 @@ TRIES = 200
 
 
 class Arm(NamedTuple):
-    """An arm that goals are drawn for."""
-
     name: str
     seed: int
     """Decides what it is off by, what is learned of it, and its goals."""
@@ -80,15 +78,11 @@ class Known(NamedTuple):
 
 
 class DrawnGoal(NamedTuple):
-    """A goal, and whether it lies where the arm was recorded."""
-
     goal: Goal
     inside: bool
 
 
 class Learned(NamedTuple):
-    """What a diagnosis learned of an arm."""
-
     text: str
     """The diagnosis.json."""
     noise: float
@@ -145,7 +139,6 @@ def drawn_rest(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
 
 
 def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator) -> Learned:
-    """Return what a diagnosis learns of an arm with causes."""
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     pace = rng.uniform(0.5, 1.3, robot.n)
     turn = rng.uniform(0.0, 2.0 * np.pi, robot.n)

@@ -44,6 +44,7 @@ from weld_twin_nodes.harness import Cell, NodeProcess
 from weld_twin_nodes.harness.cell import HealthListener
 
 from .message_packages import messages_importable
+from .party import REST
 
 RATE = 100.0
 """Joint states a second."""
@@ -93,7 +94,6 @@ class Bench:
         return self.cell.node.create_publisher(topic.message_class(), topic.name, qos.to_rclpy())
 
     def ready(self) -> None:
-        """Wait until all nodes listen and know who listens to them."""
         count = self.cell.node.count_subscribers
         self.cell.wait(lambda: count(JOINT_STATES.name) >= LISTENERS, 'listeners', 120.0)
         self.cell.meet()
@@ -109,7 +109,7 @@ class Bench:
     def joint_state(self) -> Any:
         """Return the next sound joint state; the arm goes on, not so its record."""
         self.phase += 0.3 / RATE
-        q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3]) + 0.2 * np.sin(self.phase + np.arange(6))
+        q = REST + 0.2 * np.sin(self.phase + np.arange(6))
         return self.make.joint_state(self.stamp, self.robot.joint_names, q, np.zeros(6))
 
     def send(self, message: Any, *, sound: bool = True) -> None:
@@ -146,8 +146,6 @@ class Bench:
 
 JOINT_RATE, POSE_RATE = 100.0, 60.0
 """Messages a second of the controller and of the tracker."""
-REST = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
-"""Where the arm is on the average [rad]."""
 NOISE = 2e-5
 """Standard deviation of the tracker [m]: that of a good one."""
 MEETING = 60.0
@@ -296,8 +294,6 @@ Reported = dict[str, Any]
 
 
 class Scene(NamedTuple):
-    """One fault."""
-
     name: str
     run: Callable[[Stand], Iterator[Reported]]
     """Does it on a stand whose nodes run; yields what was told."""

@@ -51,7 +51,8 @@ from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.cli.given import Given
 
 from ..real_arms.unseen import traceback_text
-from .broken_files import ROBOT, Target, mutate, targets
+from ..study import listed
+from .broken_files import ROBOT, mutate, targets
 
 CPU_LIMIT = 10.0
 """Seconds of computing a file may cost."""
@@ -67,41 +68,25 @@ class Hang(BaseException):
     """The file has cost too much time; no `except Exception` takes it for damage."""
 
 
-@dataclass
-class Finding:
-    """What a file did that it should not."""
-
-    target: str
-    case: int
-    """With the seed of the campaign it makes the same file again."""
-    what: str
-    """Exception and the place in this project's code where it came from."""
-    times: int = 1
+Finding = dict[str, Any]
+"""What a file did that it should not: exception, place in this project's code, and the first case,
+which with the seed of the campaign makes the same file again."""
 
 
-@dataclass
-class Tally:
-    """How many files were read, refused in a sentence, or went wrong."""
-
-    right: int = 0
-    refused: int = 0
-    wrong: int = 0
-
-
-def case_bytes(target: Target, seed: int, name: str, case: int) -> bytes:
-    """Return the broken file of a number."""
-    rng = Random(f'{seed}/{name}/{case}')
-    return mutate(rng, rng.choice(target.seeds), target.kind)
-
-
-def hunt(name: str, seed: int, cases: int, known: dict[str, Finding]) -> Tally:
-    """Read so many broken files of a kind; add what went wrong to what is known."""
-    tally = Tally()
-    done = 0
-    while done < cases:
-        last = min(done + BATCH, cases)
-        with forked(_batch, name, seed, done, last) as here:
-            done = _follow(here, name, done, last, tally, known)
+def hunt(name: str, seed: int, cases: int, known: dict[str, Finding]) -> Counter[str]:
+    """Return how many broken files of a kind end how, and add what went wrong to what is known."""
+    tally = Counter(right=0, refused=0, wrong=0)
+    case = 0
+    while case < cases:
+        last, outcome = min(case + BATCH, cases), ''
+        with forked(_batch, name, seed, case, last) as here:
+            while case < last and not outcome.startswith(('hangs', 'ends', 'takes')):
+                outcome = next_outcome(here)
+                if outcome not in tally:
+                    new = {'target': name, 'case': case, 'what': outcome, 'times': 0}
+                    known.setdefault(f'{name}: {outcome}', new)['times'] += 1
+                tally[outcome if outcome in tally else 'wrong'] += 1
+                case += 1
     return tally
 
 
@@ -128,37 +113,15 @@ def next_outcome(here: Connection) -> str:
         return 'ends the process'
 
 
-def _follow(
-    here: Connection, name: str, case: int, last: int, tally: Tally, known: dict[str, Finding]
-) -> int:
-    """Take the results of a process until it ends; return the next case."""
-    while case < last:
-        outcome = next_outcome(here)
-        if outcome == 'right':
-            tally.right += 1
-        elif outcome == 'refused':
-            tally.refused += 1
-        else:
-            tally.wrong += 1
-            finding = known.setdefault(f'{name}: {outcome}', Finding(name, case, outcome, 0))
-            finding.times += 1
-        case += 1
-        if outcome.startswith(('hangs', 'ends', 'takes')):
-            return case
-    return case
-
-
 def _batch(name: str, seed: int, first: int, last: int, out: Connection) -> None:
     target = targets()[name]
-    guard()
-    before = peak()
+    before = guard()
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / f'case{target.suffix}'
         for case in range(first, last):
-            path.write_bytes(case_bytes(target, seed, name, case))
-            outcome = read(target, path)
-            if peak() - before > MEMORY_LIMIT:
-                outcome = f'takes more than {MEMORY_LIMIT / 1e6:.0f} MB'
+            rng = Random(f'{seed}/{name}/{case}')
+            path.write_bytes(mutate(rng, rng.choice(target.seeds), target.kind))
+            outcome = read(target.read, path, before)
             out.send(outcome)
             if outcome.startswith('takes'):
                 break
@@ -166,8 +129,8 @@ def _batch(name: str, seed: int, first: int, last: int, out: Connection) -> None
     os._exit(0)
 
 
-def guard() -> None:
-    """Bound what this process may take from now on."""
+def guard() -> int:
+    """Bound what this process may take from now on; return the memory it has held so far [bytes]."""
     faulthandler.disable()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # the URDF parser comments on what it passes over
     warnings.simplefilter('ignore')
@@ -175,13 +138,21 @@ def guard() -> None:
     pages = int(Path('/proc/self/statm').read_text().split()[0])
     limit = MEMORY_LIMIT * 2 + pages * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    return peak()
 
 
-def read(target: Target, path: Path) -> str:
+def read(reads: Callable[[Path], Any], path: Path, before: int) -> str:
     """Return 'right' or 'refused', or what is wrong with how the file was taken."""
+    outcome = _read(reads, path)
+    if peak() - before > MEMORY_LIMIT:
+        return f'takes more than {MEMORY_LIMIT / 1e6:.0f} MB'
+    return outcome
+
+
+def _read(reads: Callable[[Path], Any], path: Path) -> str:
     signal.setitimer(signal.ITIMER_PROF, CPU_LIMIT)
     try:
-        target.read(path)
+        reads(path)
     except TwinError as error:
         text = str(error)
         if '\n' in text or not text:
@@ -255,13 +226,8 @@ def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
     }
 
 
-def try_all() -> dict[str, str]:
-    """Return what became of each, each in a process of its own."""
-    return {name: try_one(name) for name in harms()}
-
-
 def try_one(name: str) -> str:
-    """Return 'refused' with the sentence, or what went wrong."""
+    """Return 'refused' with the sentence, or what went wrong, in a process of its own."""
     with forked(_attempt, name) as here:
         return next_outcome(here)
 
@@ -279,11 +245,7 @@ def _attempt(name: str, out: Connection) -> None:
                 said.append(str(error).replace(place, ''))
                 raise
 
-        guard()
-        before = peak()
-        outcome = read(Target(path.suffix, '', (), tell), path)
-        if peak() - before > MEMORY_LIMIT:
-            outcome = f'takes more than {MEMORY_LIMIT / 1e6:.0f} MB'
+        outcome = read(tell, path, guard())
         out.send(f'{outcome}: {said[0]}' if outcome == 'refused' else outcome)
 
 
@@ -429,8 +391,6 @@ ERRORS = ('none', 'offset', 'huge', 'jumbled')
 
 @dataclass(frozen=True)
 class Draw:
-    """What a degenerate recording is made of."""
-
     robot: str = 'ur5'
     """One of `ROBOTS`."""
     stations: bool = True
@@ -577,19 +537,20 @@ def worst_of(count: int, first: int, tell: Callable[[str], None]) -> dict[str, A
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     names = list(targets())
-    chosen = [name for name in args.only.split(',') if name] or names
+    chosen = listed(args.only) or names
     if unknown := set(chosen) - set(names):
-        listed = ', '.join(names)
-        raise DataError(f'no kind of file is called {min(unknown)!r}; there are {listed}')
+        raise DataError(
+            f'no kind of file is called {min(unknown)!r}; there are {", ".join(names)}'
+        )
     findings: dict[str, Finding] = {}
     kinds = {}
     for name in chosen:
         tally = hunt(name, args.seed, args.cases, findings)
-        kinds[name] = asdict(tally)
-        tell(f'{name}: {tally.right} read, {tally.refused} refused, {tally.wrong} wrong')
+        kinds[name] = dict(tally)
+        tell('{}: {right} read, {refused} refused, {wrong} wrong'.format(name, **tally))
     for finding in findings.values():
-        tell(f'{finding.target} {finding.case}: {finding.what} ({finding.times} times)')
-    malicious = try_all()
+        tell('{target} {case}: {what} ({times} times)'.format(**finding))
+    malicious = {name: try_one(name) for name in harms()}
     for name, outcome in malicious.items():
         tell(f'{name}: {outcome}')
     recordings = worst_of(args.recordings, args.seed, tell) if args.recordings else {'bad': []}
@@ -602,7 +563,7 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
         'cpu_limit_s': CPU_LIMIT,
         'memory_limit_mb': MEMORY_LIMIT / 1e6,
         'kinds': kinds,
-        'findings': [asdict(finding) for finding in findings.values()],
+        'findings': list(findings.values()),
         'malicious': malicious,
         'recordings': recordings,
     }

@@ -41,8 +41,6 @@ TOPICS = (JOINT_STATES.name, MEASURED_POSE.name)
 
 @dataclass(frozen=True)
 class Trial:
-    """When and how a recorder is killed."""
-
     storage: str
     moment: float
     """After the first message [s]; then it is killed, or told to end if ``closing``."""
@@ -187,6 +185,7 @@ def _left(out: Path) -> tuple[str, dict[str, list[int]]]:
 
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""
+STORAGES = ('mcap', 'sqlite3')
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -194,7 +193,7 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     rows: list[dict[str, Any]] = []
     for k in range(args.times):
         trial = Trial(
-            storage=('mcap', 'sqlite3')[k % 2],
+            storage=STORAGES[k % 2],
             moment=float(rng.uniform(0.0, args.longest)),
             closing=bool(rng.random() < 0.2),
             split_mb=float(rng.choice([0.0, 0.1, 0.2])),
@@ -219,10 +218,7 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
             'recovered': sum(row['recovered'] for row in chosen),
         }
 
-    groups = {
-        storage: share([row for row in rows if row['storage'] == storage])
-        for storage in ('mcap', 'sqlite3')
-    }
+    groups = {kind: share([row for row in rows if row['storage'] == kind]) for kind in STORAGES}
     whole = share(rows)
     passed = whole['faults'] == 0 and whole['missing_s']['max'] <= ALLOWED
     return {'passed': passed, 'allowed_s': ALLOWED, 'all': whole, **groups}
@@ -231,7 +227,7 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 def table(result: dict[str, Any]) -> str:
     head = ('storage', 'kills', 'gaps, repeats, broken bags', 'missing, median', 'missing, worst')
     rows = []
-    for name in ('mcap', 'sqlite3'):
+    for name in STORAGES:
         row = result[name]
         missing = (f'{row["missing_s"][key]:.2f} s' for key in ('median', 'max'))
         rows.append((name, row['kills'], row['faults'], *missing))

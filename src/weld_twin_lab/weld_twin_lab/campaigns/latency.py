@@ -35,9 +35,11 @@ from weld_twin_nodes.harness.process import own_domain
 from weld_twin_nodes.live.diagnosis_worker import Job, Worker
 from weld_twin_nodes.live.run_node import executor
 
+from ..study import shown, tabled
 from . import partners
 from .message_packages import messages_importable
-from .partners import BEAT, HOME, ROBOT
+from .partners import BEAT, ROBOT
+from .party import REST
 from .soak import cpu_ns
 
 SETTLE = 0.15
@@ -158,7 +160,6 @@ class Race:
         self._stack.close()
 
     def turn(self, contender: Contender, rate: float, seconds: float) -> None:
-        """Let one contender answer for some time."""
         assert self._pulse.stdin is not None
         assert self._pulse.stdout is not None
         count = max(round(rate * seconds), 1)
@@ -240,7 +241,7 @@ def _arm(both: Race) -> Callable[[], None]:
         JOINT_STATES.message_class(), ARM, JOINT_STATES.offered.to_rclpy()
     )
     clock = both.node.get_clock()
-    return lambda: publisher.publish(encode(clock.now().nanoseconds, HOME))
+    return lambda: publisher.publish(encode(clock.now().nanoseconds, REST))
 
 
 RELAY = (partners.__name__, 'relay')
@@ -355,41 +356,35 @@ def _job() -> Job:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row for each rate: latency in ms, CPU time in us."""
-
     def ms(row: dict[str, float]) -> str:
         return f'{row["p50_us"] / 1e3:.2f} / {row["p99_us"] / 1e3:.2f}'
 
     def ratio(row: dict[str, float]) -> str:
         return f'{row["p50_us"]:.2f} / {row["p99_us"]:.2f}'
 
-    head = (
-        *('Hz', 'relay p50 / p99', 'raw relay', 'rclpy alone', 'twin', 'twin / relay'),
-        *('twin on /tf / relay', 'CPU relay / twin', 'ratio'),
-    )
-    rows = (
-        (
-            f'{row["rate_hz"]:g}',
-            *(ms(row[name]) for name in ('relay', 'raw_relay', 'bare', 'twin')),
-            *(ratio(row[name]) for name in ('ratio', 'ratio_tf')),
-            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
-            f'{row["ratio"]["cpu_us"]:.2f}',
-        )
-        for row in result['rates']
-    )
-    return markdown.table(head, *rows) + '\n\n' + pose_table(result['poses'])
+    columns: dict[str, Callable[[Any], object]] = {
+        'Hz': shown('rate_hz', by='{:g}'),
+        'relay p50 / p99': lambda row: ms(row['relay']),
+        'raw relay': lambda row: ms(row['raw_relay']),
+        'rclpy alone': lambda row: ms(row['bare']),
+        'twin': lambda row: ms(row['twin']),
+        'twin / relay': lambda row: ratio(row['ratio']),
+        'twin on /tf / relay': lambda row: ratio(row['ratio_tf']),
+        'CPU relay / twin': lambda row: (
+            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}'
+        ),
+        'ratio': shown('ratio', 'cpu_us', by='{:.2f}'),
+    }
+    return tabled(columns, result['rates']) + '\n\n' + pose_table(result['poses'])
 
 
 def pose_table(poses: dict[str, Any]) -> str:
     """Return a row for the relay of poses, one for the compensator, and one of their ratios."""
-    keys = ('p50_us', 'p99_us')
+    head = (f'{poses["rate_hz"]:g} poses a second', 'p50', 'p99', 'CPU')
     rows = [
-        (
-            name,
-            *(f'{poses[name][key] / 1e3:.2f} ms' for key in keys),
-            f'{poses[name]["cpu_us"]:.0f} us',
-        )
-        for name in ('relay', 'compensator')
+        (name, *(f'{own[key] / 1e3:.2f} ms' for key in COMPARED[:2]), f'{own["cpu_us"]:.0f} us')
+        for name, own in poses.items()
+        if name in ('relay', 'compensator')
     ]
-    rows.append(('ratio', *(f'{poses["ratio"][key]:.2f}' for key in keys), ''))
-    return markdown.table((f'{poses["rate_hz"]:g} poses a second', 'p50', 'p99', 'CPU'), *rows)
+    ratio = ('ratio', *(f'{poses["ratio"][key]:.2f}' for key in COMPARED[:2]), '')
+    return markdown.table(head, *rows, ratio)

@@ -163,7 +163,6 @@ def _refuse_unable() -> None:
 
 
 def _build(package: str, folder: Path) -> None:
-    """Write, generate and compile one package into ``folder/site``."""
     source, made = folder / 'source' / package, folder / 'made' / package
     site = folder / 'site' / package
     for kind, texts in _interfaces(package).items():

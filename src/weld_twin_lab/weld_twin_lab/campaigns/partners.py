@@ -9,7 +9,7 @@ frames
 pulse
     Joint states or poses on the beat, stamped with the monotonic clock of the moment. It reads lines
     ``TOPIC RATE COUNT POSES``, answers each with ``done`` when sent, and ends with its standard input.
-    Poses begin where an arm stands at `HOME`, and go to and fro.
+    Poses begin where an arm stands at `REST`, and go to and fro.
 relay
     The least a node can do: it sends on what it receives; the yardstick of the twin's latency. Topics
     are remapped; ``raw`` sends the serialised bytes on unread, ``bare`` answers to joint states with
@@ -41,13 +41,14 @@ from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
 from weld_twin_nodes.live.run_node import LOOP, executor
 
+from .party import REST
+
 RATE = 100.0
 """Messages on `/tf` a second, as a robot_state_publisher sends at most."""
 LINKS = 7
 """Frames of an arm in each."""
 ROBOT = 'ur5'
-HOME = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
-"""Joints of the arm [rad]."""
+
 DOUBLE = 8
 """Bytes of a number; a pose ends with seven."""
 WAY, BEAT = 0.02, 2.0
@@ -85,8 +86,8 @@ def frames() -> None:
 def pulse() -> None:
     node = Node('pulse')
     robot, make = catalog.load(ROBOT), ros_messages()
-    state = make.joint_state(1, robot.joint_names, HOME, np.zeros(robot.n), 'base_link')
-    T = forward(robot, HOME)
+    state = make.joint_state(1, robot.joint_names, REST, np.zeros(robot.n), 'base_link')
+    T = forward(robot, REST)
     messages = {
         '0': (JOINT_STATES, bytearray(serialize_message(state))),
         '1': (TWIN_POSE, bytearray(PoseEncoder('base')(1, T[:3, 3], T[:3, :3]))),

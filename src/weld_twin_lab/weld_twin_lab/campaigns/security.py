@@ -129,13 +129,8 @@ def _node(
     """Start a node as the launch files do; its own enclave is an argument."""
     environment = {**os.environ, **locked}
     environment.pop('ROS_SECURITY_ENCLAVE_OVERRIDE', None)
-    command = [
-        sys.executable,
-        '-m',
-        MODULES[name],
-        *('--ros-args', '--enclave', enclave(name)),
-        *words,
-    ]
+    own = ('--ros-args', '--enclave', enclave(name))
+    command = [sys.executable, '-m', MODULES[name], *own, *words]
     with (folder / f'{name}.log').open('wb') as log:
         return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
 
@@ -217,17 +212,12 @@ def verdict(result: dict[str, Any]) -> bool:
 
 def table(result: dict[str, Any]) -> str:
     head = ('keys', 'who', "twin's poses it heard", 'joint states of it that were recorded')
-    rows = [
-        (way, who, result[way]['heard'][k], result[way]['recorded'][k])
-        for way in WAYS
-        if way in result
-        for k, who in enumerate(result['parties'])
-    ]
-    more = [
-        f'{way}: all nodes ran: {"yes" if result[way]["alive"] else "no"}; '
-        f'topics recorded: {len(result[way]["topics"])}'
-        for way in WAYS
-        if way in result
-    ]
-    remarks = '\n'.join([*more, *([result['reason']] if result['reason'] else [])])
+    rows, more = [], []
+    for way in WAYS:
+        if way in result:
+            own, ran = result[way], 'yes' if result[way]['alive'] else 'no'
+            each = zip(result['parties'], own['heard'], own['recorded'], strict=True)
+            rows += [(way, *row) for row in each]
+            more.append(f'{way}: all nodes ran: {ran}; topics recorded: {len(own["topics"])}')
+    remarks = '\n'.join([*more, *filter(None, [result['reason']])])
     return f'{markdown.table(head, *rows)}\n{remarks}\n'

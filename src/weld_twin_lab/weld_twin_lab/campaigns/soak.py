@@ -18,11 +18,12 @@ import numpy as np
 from weld_twin_core.arm import catalog
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.bags import BagReader
-from weld_twin_msgs_py.files import markdown
 from weld_twin_nodes.cli.given import Given
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.offline.seam_motion import plan_motion
+
+from ..study import shown, tabled
 
 PROC = Path('/proc')
 PAGE = os.sysconf('SC_PAGE_SIZE')
@@ -38,7 +39,6 @@ def cpu_ns(pid: int) -> int:
 
 
 def rss_bytes(pid: int) -> int:
-    """Return the memory of a process that is resident [bytes]."""
     return int((PROC / str(pid) / 'statm').read_text().split()[1]) * PAGE
 
 
@@ -75,48 +75,27 @@ class Usage(NamedTuple):
 
 
 class Soak:
-    """A context manager with all nodes of a cell in processes of their own."""
+    """All nodes of a cell in processes of their own."""
 
-    def __init__(self, folder: Path, bag: Path, rate: float, seconds: float, effects: str) -> None:
-        self._cell = Cell(folder)
-        self._bag, self._rate, self._effects = bag, rate, effects
+    def __init__(self, cell: Cell, bag: Path, rate: float, seconds: float) -> None:
+        self._cell, self._rate = cell, rate
         samples = plan_motion(catalog.load(ROBOT), PATH, rate=rate).motion.t.size
-        self._rounds = max(round(seconds * rate / samples), 1)
-        self.sent = self._rounds * samples
+        rounds = max(round(seconds * rate / samples), 1)
+        self.sent = rounds * samples
         self.samples: dict[str, list[Usage]] = defaultdict(list)
         self._work: dict[int, Usage] = {}
-
-    def __enter__(self) -> Soak:
-        self._cell.__enter__()
-        try:
-            self._start()
-        except BaseException:
-            self._cell.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._cell.__exit__()
-
-    def finish(self) -> None:
-        """Let the recorder complete its bag, which takes it some time."""
-        recorder = self._cell.processes[0]
-        recorder.interrupt()
-        recorder.end(COMPLETE)
-
-    def _start(self) -> None:
-        cell, sure = self._cell, {'reliable_inputs': True}
         self._listener = HealthListener(cell.node)
-        cell.start('recorder', out=str(self._bag), split_duration=SPLIT, **sure)
+        sure = {'reliable_inputs': True}
+        cell.start('recorder', out=str(bag), split_duration=SPLIT, **sure)
         cell.start('live_diagnosis', **sure)
         cell.start('deviation_markers', **sure)
         cell.start('deviation_analyzer', wait_for_subscribers=1, **sure)
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
-        cell.start('error_injector', effects=self._effects, seed=1, wait_for_subscribers=2, **sure)
+        cell.start('error_injector', effects=EFFECTS, seed=1, wait_for_subscribers=2, **sure)
         cell.start(
             'trajectory_generator',
-            rate=self._rate,
-            repeat=self._rounds,
+            rate=rate,
+            repeat=rounds,
             path=PATH,
             robot=ROBOT,
             wait_for_subscribers=4,
@@ -196,17 +175,12 @@ class Soak:
         """Return received, refused and missing of each input, and what was told but ok."""
         out: dict[str, Any] = {}
         for name, values in sorted(self._listener.values.items()):
-            reported = [entry for entry in self._reported.get(name, []) if entry[0] != 'ok']
-            row: dict[str, int] = {
-                key: int(values[key]) for key in ('received', 'refused') if key in values
-            }
+            said = [text for level, text in self._reported.get(name, []) if level != 'ok']
+            row: dict[str, int] = {}
+            row |= {key: int(values[key]) for key in ('received', 'refused') if key in values}
             if name.partition(': ')[2] in COUNTED:
                 row['missing'] = self.sent - row['received']
-            out[name] = {
-                **row,
-                'not_ok': len(reported),
-                'worst': sorted({text for _, text in reported})[:5],
-            }
+            out[name] = {**row, 'not_ok': len(said), 'worst': sorted(set(said))[:5]}
         return out
 
 
@@ -250,10 +224,13 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: args.cores])
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
-        with Soak(Path(folder) / 'cell', bag, args.rate, args.minutes * 60.0, EFFECTS) as soak:
+        with Cell(Path(folder) / 'cell') as cell:
+            soak = Soak(cell, bag, args.rate, args.minutes * 60.0)
             soak.run(EVERY, tell)
             health, nodes = soak.health(), soak.usage(WARM)
-            soak.finish()
+            recorder = cell.processes[0]
+            recorder.interrupt()
+            recorder.end(COMPLETE)
             lost = losses(bag, soak.sent)
     result = {
         'minutes': round(soak.sent / args.rate / 60.0, 2),
@@ -278,17 +255,11 @@ def table(result: dict[str, Any]) -> str:
             if name.partition(': ')[0].lstrip('/') == node
         )
 
-    head = ('node', 'share of a core', 'memory', 'its slope', 'messages missed')
-    return markdown.table(
-        head,
-        *(
-            (
-                name.replace('_', ' '),
-                f'{100.0 * row["cpu_share"]:.0f} %',
-                f'{row["rss_mib"]:.0f} MiB',
-                f'{row["rss_slope_mib_per_h"]:+.1f} MiB/h',
-                missed(name),
-            )
-            for name, row in result['nodes'].items()
-        ),
-    )
+    columns: dict[str, Callable[[Any], object]] = {
+        'node': lambda row: row[0].replace('_', ' '),
+        'share of a core': shown(1, 'cpu_share', by='{:.0f} %', times=100.0),
+        'memory': shown(1, 'rss_mib', by='{:.0f} MiB'),
+        'its slope': shown(1, 'rss_slope_mib_per_h', by='{:+.1f} MiB/h'),
+        'messages missed': lambda row: missed(row[0]),
+    }
+    return tabled(columns, result['nodes'].items())

@@ -19,10 +19,6 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.bundle import seen_by
 from weld_twin_core.cameras import Camera, Lens, Sightings, Target
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
-from weld_twin_core.diagnosis.frames.alignment import initial_frames
-from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_msgs_py.files import markdown
@@ -30,13 +26,13 @@ from weld_twin_msgs_py.tables import read_camera, read_pixels, read_target
 from weld_twin_nodes.offline.task_pool import Task
 
 from ..blind.cause_sizes import AT_REST, Cause, draw, plausible, scaled, site
-from ..blind.scoring import rms
+from ..blind.scoring import explained, moves_of, rms
 from ..plant.exponentials import Command, Motion, compose, exp_screw, from_quaternion, inverse
 from ..plant.plant import run as run_plant
 from ..plant.tracker import Eye, Tracker, looking, seen
 from ..real_arms.sources import motoman
 from ..real_arms.unseen import ALIGN, PLAIN, plain_fit, residual
-from ..study import Study, head, require_simulator
+from ..study import Study, head, require_simulator, tabled
 
 KINDS = ('arm', 'track and positioner', 'two arms')
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14')
@@ -108,11 +104,7 @@ def really(
     q: Array,
     rng: np.random.Generator,
 ) -> Motion:
-    """
-    Return the torch as the plant has it, seen from the workpiece where there is one.
-
-    names: joints in the order of the postures ``q``, shape (M, n) [rad or m].
-    """
+    """Return the torch as the plant has it at postures, seen from a workpiece if there is one."""
     arm = {key: value for key, value in data.items() if key != 'workpiece'}
     torch = _branch(arm, names, causes, q, rng)
     if 'workpiece' not in data:
@@ -175,9 +167,6 @@ def sealed(kind: str, seed: int) -> CaseResult:
     return {'kind': kind, 'seed': seed, 'robot': robot.name, 'noises': shown, **told}
 
 
-FRAMES = ('base', 'tool')
-
-
 def beside_a_camera(seed: int) -> CaseResult:
     """Return what pixels of two cameras, and a tracker at the same stations, tell of one cause."""
     rng = np.random.default_rng([seed, 77])
@@ -220,7 +209,7 @@ def _drawn(
 
 def _told(robot: Robot, recording: Recording, cause: Cause) -> CaseResult:
     """Return what is told of a recording with both frames open, beside the truth."""
-    return opened(diagnose(recording, robot, align=FRAMES, experiment=False), site(cause))
+    return opened(diagnose(recording, robot, align=ALIGN, experiment=False), site(cause))
 
 
 def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> CaseResult:
@@ -269,13 +258,8 @@ def _apart(robot: Robot, cause: Cause) -> bool:
 
 def beyond_frames(tool: Motion, off: Array) -> Array:
     """Return the part of displacements (M, 3) [m] that moved frames of base and tool leave."""
-    count = len(off)
-    turns = [np.cross(axis, tool.position) for axis in np.eye(3)]
-    base = [*turns, *(np.tile(axis, (count, 1)) for axis in np.eye(3))]
-    ways = [*base, *np.moveaxis(tool.rotation, -1, 0)]
-    design = np.stack([way.ravel() for way in ways], axis=1)
-    fitted = np.linalg.lstsq(design, off.ravel(), rcond=None)[0]
-    return np.asarray(off - (design @ fitted).reshape(off.shape))
+    ways = [*moves_of(tool.position), *np.moveaxis(tool.rotation, -1, 0)]
+    return off - explained(ways, off)
 
 
 def exp_screw_about(turns: Array) -> Array:
@@ -340,9 +324,6 @@ def part(data: str, which: int) -> dict[str, object]:
 
     Frames of base and tool are the tracker's, of the other stretches; all else is told from their
     pixels alone, or from their tracker by a plain fit of the geometry.
-
-    data: folder of published recordings; holds motoman_left.
-    which: the stretch left out, counted from 0.
     """
     folder = Path(data)
     robot = motoman(folder, masses=False).robot
@@ -359,9 +340,10 @@ def part(data: str, which: int) -> dict[str, object]:
     diagnosis = diagnose(pixels, robot, align=ALIGN, experiment=False)
     train, judged = (_of(bare, place, rows) for rows in (rest, test))
     geometry = plain_fit(train, robot, PLAIN['geometry'], ALIGN).found
-    models = {'frames': (), 'pixels': diagnosis.model.found, 'tracker': geometry}
-    remaining = {name: _left(train, judged, robot, effects) for name, effects in models.items()}
-    return {'part': which, 'status': diagnosis.status, **remaining}
+    known = {'frames': (), 'pixels': diagnosis.model.found, 'tracker': geometry}
+    models = {name: plain_fit(train, robot, (), ALIGN, own) for name, own in known.items()}
+    left = {name: rms(residual(own, train, judged)[:3].T) for name, own in models.items()}
+    return {'part': which, 'status': diagnosis.status, **{k: 1e3 * v for k, v in left.items()}}
 
 
 def _tracked(path: Path) -> Array:
@@ -377,14 +359,6 @@ def _of(bare: Recording, place: Array, rows: NDArray[np.intp]) -> Recording:
     return replace(bare, measured=Measurements(bare.joints.t[kept], place[kept]))
 
 
-def _left(train: Recording, judged: Recording, robot: Robot, known: tuple[Effect, ...]) -> float:
-    """Return what a model leaves where its frames were not fitted [mm RMS]."""
-    problem = Problem((usable(train),), ALIGN)
-    start = initial_frames(problem, Model(robot, (robot.T_world_base,), known))
-    model = fit(problem, start, problem.unit_scale()).model
-    return 1e3 * rms(residual(model, train, judged)[:3].T)
-
-
 AS_TRACKED = 0.8
 """Goal: share of the causes named beside a tracker that pixels name, too."""
 
@@ -395,11 +369,19 @@ def page(
     """Return the page of sealed cells, of cases beside a camera, and of a real arm's pixels."""
     lines = ['# Whole cells, and cameras', '']
     if cases:
+        kinds = dict.fromkeys(case['kind'] for case in cases)
+        groups = {kind: [case for case in cases if case['kind'] == kind] for kind in kinds}
         lines += ['One cause of 3 to 8 noises, told with the frames of base and tool fitted:', '']
-        lines += [_cells(cases), '']
+        lines += [_counts('cell', groups), '']
     if pixels:
+        ways = {way: [one[way] for one in pixels] for way in ('tracker', 'pixels')}
+        share = f'{100.0 * named_as_tracked(pixels):.0f} %'
         lines += ['The same stations told from pixels of two cameras, and from a tracker:', '']
-        lines += [_beside(pixels), '']
+        lines += [
+            _counts('told from', ways),
+            f'Of what the tracker names, pixels name {share}.',
+            '',
+        ]
     if real:
         lines += ['A real arm told from pixels alone, and judged by a tracker [mm RMS]:', '']
         lines += [_real(real), '']
@@ -412,27 +394,19 @@ def named_as_tracked(pixels: Sequence[CaseResult]) -> float:
     return float(np.mean(both)) if both else 1.0
 
 
-def _cells(cases: Sequence[CaseResult]) -> str:
-    rows = []
-    for kind in dict.fromkeys(case['kind'] for case in cases):
-        own = [case for case in cases if case['kind'] == kind]
-        rows.append((kind, *_counts(own)))
-    return markdown.table(
-        ('cell', 'cases', 'named', 'nothing else', 'sure', 'sure and wrong'), *rows
-    )
+def _counts(what: str, groups: Mapping[str, Sequence[CaseResult]]) -> str:
+    def number(key: str) -> Callable[[Any], int]:
+        return lambda row: sum(bool(one[key]) for one in row[1])
 
-
-def _beside(pixels: Sequence[CaseResult]) -> str:
-    rows = [(way, *_counts([one[way] for one in pixels])) for way in ('tracker', 'pixels')]
-    head = ('told from', 'cases', 'named', 'nothing else', 'sure', 'sure and wrong')
-    share = f'Of what the tracker names, pixels name {100.0 * named_as_tracked(pixels):.0f} %.'
-    return f'{markdown.table(head, *rows)}\n{share}'
-
-
-def _counts(cases: Sequence[CaseResult]) -> tuple[str, ...]:
-    wrong = sum(one['sure'] and not one['right'] for one in cases)
-    each = (sum(bool(one[key]) for one in cases) for key in ('named', 'right', 'sure'))
-    return str(len(cases)), *map(str, each), str(wrong)
+    columns: dict[str, Callable[[Any], object]] = {
+        what: lambda row: row[0],
+        'cases': lambda row: len(row[1]),
+        'named': number('named'),
+        'nothing else': number('right'),
+        'sure': number('sure'),
+        'sure and wrong': lambda row: sum(one['sure'] and not one['right'] for one in row[1]),
+    }
+    return tabled(columns, groups.items())
 
 
 def _real(real: Sequence[CaseResult]) -> str:

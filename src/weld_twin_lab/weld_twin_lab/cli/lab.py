@@ -21,8 +21,6 @@ from ..study import MISSED, Study
 
 
 class Proof(NamedTuple):
-    """A proof, or a job of one."""
-
     run: str
     """Module below the package, and the function that returns False where a goal is missed."""
     text: str
@@ -428,7 +426,6 @@ PROOFS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the proofs and their jobs, each with its options."""
     places = parser.add_subparsers(required=True, metavar='PROOF', dest='proof', title='proofs')
     for name, proof in PROOFS.items():
         own = add_command(places, name, Command(proof.text, options=proof.options))

@@ -56,8 +56,6 @@ Cause = tuple[Name, ...]
 
 @dataclass(frozen=True)
 class ContestCase:
-    """What a method may know."""
-
     robot: Robot
     """As its maker describes it."""
     train: Recording
@@ -86,8 +84,6 @@ class ContestCase:
 
 @dataclass(frozen=True)
 class ContestAnswer:
-    """What a method says."""
-
     predicted: Array
     """Where the tool was at the times asked for, shape (M, 3) [m]."""
     causes: tuple[Cause, ...] = ()
@@ -137,21 +133,18 @@ def write_case(
 
 def _write_inputs(folder: Path, use: str, recording: Recording) -> None:
     motion = recording.joints
-    columns, names = (
-        [motion.t, motion.q],
-        ['t', *(f'q{k}' for k in range(1, motion.q.shape[1] + 1))],
-    )
-    if motion.qd is not None:
-        columns.append(motion.qd)
-        names += [f'qd{k}' for k in range(1, motion.q.shape[1] + 1)]
+    columns, names = [motion.t], ['t']
+    for key, values in (('q', motion.q), ('qd', motion.qd)):
+        if values is not None:
+            columns.append(values)
+            names += [f'{key}{k + 1}' for k in range(values.shape[1])]
     _write(folder / f'{use}_joints.csv', names, columns)
-    if recording.wrench is not None:
-        names = ['t', 'fx', 'fy', 'fz', 'mx', 'my', 'mz']
-        signal = recording.wrench
-        _write(folder / f'{use}_wrench.csv', names, [signal.t, signal.value])
-    if recording.temperature is not None:
-        signal = recording.temperature
-        _write(folder / f'{use}_temperature.csv', ['t', 'celsius'], [signal.t, signal.value])
+    for key, signal, heads in (
+        ('wrench', recording.wrench, ('fx', 'fy', 'fz', 'mx', 'my', 'mz')),
+        ('temperature', recording.temperature, ('celsius',)),
+    ):
+        if signal is not None:
+            _write(folder / f'{use}_{key}.csv', ['t', *heads], [signal.t, signal.value])
 
 
 def _write(path: Path, names: Sequence[str], columns: Sequence[Array]) -> None:
@@ -252,8 +245,6 @@ RUN = 'run.json'
 
 @dataclass(frozen=True)
 class Run:
-    """One method on one case."""
-
     answer: ContestAnswer | None
     """None where it gave none."""
     seconds: float
@@ -265,11 +256,9 @@ class Run:
 
 def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     """
-    Put sealed cases into the open form; return their names.
+    Put sealed cases into the open form, where they are not there already; return their names.
 
-    cases, truths: as ``weld-twin lab blind make`` writes them. Of the truths, only what was
-    commanded while the tool was measured is used.
-    out: cases that are there already are left as they are.
+    Of the truths, only what was commanded while the tool was measured is used.
     """
     names = [str(entry['name']) for entry in seal.read(cases / seal.CASES)['cases']]
     for name in names:
@@ -352,16 +341,9 @@ def ended(words: Sequence[str], case: Path, place: Path) -> dict[str, Any]:
     filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
     with (place / SAID).open('w', encoding='utf-8') as said:
         code, cost = cost_of(filled, said=said, limit=LIMIT)
-    used = {'seconds': cost.cpu, 'memory_bytes': int(cost.peak)}
-    return {**used, 'trouble': _trouble(place, code)}
-
-
-def _trouble(place: Path, code: int) -> str:
-    """Return the last line that a program said before it failed; nothing where it did not."""
-    if code == 0:
-        return ''
-    lines = (place / SAID).read_text(encoding='utf-8').strip().splitlines()
-    return lines[-1] if lines else f'exit code {code}'
+    last = (place / SAID).read_text(encoding='utf-8').strip().rpartition('\n')[2]
+    trouble = (last or f'exit code {code}') if code else ''
+    return {'seconds': cost.cpu, 'memory_bytes': int(cost.peak), 'trouble': trouble}
 
 
 KINDS = ('n30', 'wrist_10deg', 'octant_0', 'odd')
@@ -396,23 +378,18 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
 
 def _written(split: Split, folder: Path) -> Array:
     """Write a case; return what it asks for. Where a region was left, it is asked outside of it."""
-    ask = split.inside if split.outside is None else split.outside
+    ask, train = split.outside or split.inside, split.train
     assert ask is not None
-    assert ask.measured is not None
-    framed = plain_fit(split.train, catalog.load(split.robot), (), ALIGN)
+    framed = plain_fit(train, catalog.load(split.robot), (), ALIGN)
     robot = framed.robot.with_frames(base=framed.bases[0])
     with TemporaryDirectory() as place:
         file = Path(place) / 'robot.yaml'
         write_text(file, yaml_text(robot.to_mapping()))
         said = {'align': sorted(ALIGN), 'exclude': [], 'known': ''}
-        write_case(folder, file, (_places(split.train), ask), said)
-    return np.asarray(ask.measured.position)
-
-
-def _places(recording: Recording) -> Recording:
-    """Return the recording without orientations: few methods can use them."""
-    assert recording.measured is not None
-    return recording.with_measured(replace(recording.measured, rotation=None))
+        # Without orientations: few methods can use them.
+        train = train.with_measured(replace(measured_of(train), rotation=None))
+        write_case(folder, file, (train, ask), said)
+    return measured_of(ask).position
 
 
 def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) -> Errors:
@@ -449,15 +426,12 @@ def _millimetres(error: float | None, best: float) -> str:
 
 def page(table: str, errors: Errors, measured: Mapping[str, Array]) -> str:
     """Return the page: the table of sealed cases, and errors on measured arms where these were asked."""
-    parts = [f'## On sealed cases\n\n{table}']
-    if errors:
-        parts.append(_on_arms(errors, measured))
-    return '\n'.join(parts)
-
-
-def _on_arms(errors: Errors, measured: Mapping[str, Array]) -> str:
+    sealed = f'## On sealed cases\n\n{table}'
+    if not errors:
+        return sealed
     asked = ', '.join(f'{name} {len(rows)}' for name, rows in measured.items())
     return (
+        f'{sealed}\n'
         '## On two measured arms\n\nMean error [mm] on the stations asked for; the least on every '
         'split is bold. `n30` is thirty stations, `wrist_10deg` and `octant_0` are narrow regions '
         f'asked about outside of them, `odd` is every second station.\n\n'

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,16 @@ from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import seal
 from ..blind.cause_sizes import Site
-from ..blind.scoring import CONFIDENT, IN_LIBRARY, NORMAL_90, answers_of, counted, rms
-from ..study import Study, listed, tabled
+from ..blind.scoring import (
+    CONFIDENT,
+    IN_LIBRARY,
+    NORMAL_90,
+    answers_of,
+    counted,
+    measured_of,
+    rms,
+)
+from ..study import Study, listed, shown, tabled
 from . import course
 from .course import ContestAnswer, Name, Run, read_case
 from .entrants import ENTRANTS
@@ -45,7 +54,6 @@ class Sealed:
 
     @property
     def named(self) -> bool:
-        """Return whether the library of effects knows the cause."""
         return self.truth['kind'] in IN_LIBRARY
 
 
@@ -53,9 +61,8 @@ def sealed(cases: Path, truths: Path, name: str, nominal: Array) -> Sealed:
     """Return the truth of a case; ``nominal`` is what the nominal arm predicts, shape (M, 3)."""
     truth = seal.read(truths / name / seal.TRUTH)
     test = read_recording(truths / name / seal.TEST, load_robot(str(cases / name / seal.ROBOT)))
-    assert test.measured is not None, 'a test is measured'
     good = counted(test, truth['outliers'])
-    positions = test.measured.position
+    positions = measured_of(test).position
     return Sealed(truth, positions, good, rms((positions - nominal)[good]))
 
 
@@ -91,11 +98,7 @@ class Point:
 
 
 def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
-    """
-    Return the share held by 90 % intervals, their median width and the mean CRPS of normal answers.
-
-    off, sigma: measured minus predicted, and how sure that was said to be, shape (M, 3) [m].
-    """
+    """Return the share held by 90 % intervals, their median width and mean CRPS, off by (M, 3) [m]."""
     z = off / sigma
     score = sigma * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * DENSITY * np.exp(-0.5 * z**2) - APART)
     covered = float((np.abs(z) <= NORMAL_90).mean())
@@ -168,47 +171,44 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
 
 def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, Any]:
     points = [point(run.answer, cases[name]) for name, run in runs.items() if run.answer]
-    out: dict[str, Any] = {'cases': len(runs), 'answers': len(points)}
-    for key in ('detected', 'false_alarm', 'family', 'joint', 'belief', 'sure_wrong'):
-        values = [getattr(each, key) for each in points if getattr(each, key) is not None]
-        out[key] = float(np.mean(values)) if values else None
-    remaining = np.array([each.left for each in points])
-    out['left'] = float(np.median(remaining)) if points else None
-    out['over_floor'] = float(np.median([p.over_floor for p in points])) if points else None
-    for key in ('held', 'width_m', 'crps_m'):
+
+    def over_all(key: str) -> float | None:
+        """Return a mean, or a median of what is a size."""
         given = [getattr(each, key) for each in points if getattr(each, key) is not None]
-        out[key] = None if not given else float((np.mean if key == 'held' else np.median)(given))
-    out['worse_than_nominal'] = int((remaining > 1.0).sum())
-    out['seconds'] = float(np.median([run.seconds for run in runs.values()]))
-    out['memory_bytes'] = float(np.median([run.memory_bytes for run in runs.values()]))
-    return out
+        middle = np.median if key in ('left', 'over_floor', 'width_m', 'crps_m') else np.mean
+        return float(middle(given)) if given else None
+
+    said = list(runs.values())
+    return {
+        'cases': len(runs),
+        'answers': len(points),
+        **{field.name: over_all(field.name) for field in fields(Point)},
+        'worse_than_nominal': sum(each.left > 1.0 for each in points),
+        'seconds': float(np.median([run.seconds for run in said])),
+        'memory_bytes': float(np.median([run.memory_bytes for run in said])),
+    }
 
 
-def _share(value: float | None) -> str:
-    return '-' if value is None else f'{100.0 * value:.0f} %'
-
-
-def _number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
-    return '-' if value is None else f'{value / unit:.{digits}f}'
-
-
+_share = partial(shown, 1, by='{:.0f} %', times=100.0, none='-')
+_number = partial(shown, 1, by='{:.2f}', none='-')
+_millimetres = partial(shown, 1, by='{:.3f}', times=1e3, none='-')
 COLUMNS: dict[str, Callable[[Any], object]] = {
     'method': lambda row: row[0],
     'answers': lambda row: f'{row[1]["answers"]} of {row[1]["cases"]}',
-    'detected': lambda row: _share(row[1]['detected']),
-    'false alarms': lambda row: _share(row[1]['false_alarm']),
-    'family': lambda row: _share(row[1]['family']),
-    'joint': lambda row: _share(row[1]['joint']),
-    'belief (FIA)': lambda row: _number(row[1]['belief']),
-    'sure and wrong': lambda row: _share(row[1]['sure_wrong']),
-    'gap left, median': lambda row: _number(row[1]['left']),
-    'over the floor, median': lambda row: _number(row[1]['over_floor']),
-    'worse than nominal': lambda row: row[1]['worse_than_nominal'],
-    '90 % hold': lambda row: _share(row[1]['held']),
-    'their width [mm]': lambda row: _number(row[1]['width_m'], 3, 1e-3),
-    'CRPS [mm]': lambda row: _number(row[1]['crps_m'], 3, 1e-3),
-    'processor [s]': lambda row: f'{row[1]["seconds"]:.1f}',
-    'memory [MB]': lambda row: f'{row[1]["memory_bytes"] / 1e6:.0f}',
+    'detected': _share('detected'),
+    'false alarms': _share('false_alarm'),
+    'family': _share('family'),
+    'joint': _share('joint'),
+    'belief (FIA)': _number('belief'),
+    'sure and wrong': _share('sure_wrong'),
+    'gap left, median': _number('left'),
+    'over the floor, median': _number('over_floor'),
+    'worse than nominal': shown(1, 'worse_than_nominal'),
+    '90 % hold': _share('held'),
+    'their width [mm]': _millimetres('width_m'),
+    'CRPS [mm]': _millimetres('crps_m'),
+    'processor [s]': shown(1, 'seconds', by='{:.1f}'),
+    'memory [MB]': shown(1, 'memory_bytes', by='{:.0f}', times=1e-6),
 }
 """Columns of the table of methods, each a name and its summary."""
 

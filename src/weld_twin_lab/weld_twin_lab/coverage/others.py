@@ -133,8 +133,6 @@ TIES = tuple(Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS)))
 
 
 class Sealed(NamedTuple):
-    """An arm with one flaw, and its touches."""
-
     robot: Robot
     cause: Cause
     recording: Recording

@@ -21,7 +21,7 @@ from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.errors import DataError, TwinError
-from weld_twin_core.recording import Measurements, Recording
+from weld_twin_core.recording import Recording
 from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features
@@ -37,10 +37,10 @@ from weld_twin_core.twin.twin import Twin
 
 from ..belief.judged import true_shares
 from ..belief.trial import diagnosed, drawn, recordings_of
-from ..blind.blind_cell import GROSS, as_recording, exact, record
+from ..blind.blind_cell import GROSS, exact
 from ..blind.cause_sizes import Cause, site, small_errors
 from ..blind.making import SealedCase, one_arm
-from ..blind.scoring import NORMAL_90, TO_90, gap_on, nominal_on, rms
+from ..blind.scoring import NORMAL_90, TO_90, counted, gap_on, measured_of, nominal_on, rms
 from ..real_arms.unseen import flagged
 
 PART = (0.005, 0.1)
@@ -52,6 +52,7 @@ FEWEST = 15
 """Poses of a motion below which their share says nothing."""
 ROUNDING = 1e-9
 """Of a true position [m]: a cell whose model is exact leaves no digits."""
+Mask = NDArray[np.bool_]
 
 
 def of_case(seed: int, number: int) -> dict[str, Any] | None:
@@ -69,7 +70,10 @@ def on_an_arm(case: SealedCase, seed: int, number: int) -> SealedCase:
     """Return a case whose arm is exact but for its causes, or, of every other number, is not."""
     if number % 2 == 0:
         return case
-    return replace(case, causes=[*case.causes, *_besides(case, seed, number)])
+    rng = np.random.default_rng([seed, number, 1])
+    part, there = float(np.exp(rng.uniform(*np.log(PART)))), set(map(site, case.causes))
+    small = [own for own in small_errors(case.cell.robot, rng, part) if site(own) not in there]
+    return replace(case, causes=[*case.causes, *small])
 
 
 def of_drawn(
@@ -79,7 +83,6 @@ def of_drawn(
     Return what all promises of one diagnosis are worth, and the diagnosis.
 
     named: those of the case that a diagnosis should name; the others are the arm's small errors.
-    poor: how the motion was made poor.
     """
     exact_arm = len(named) == len(case.causes)
     entry: dict[str, Any] = {
@@ -104,18 +107,11 @@ def of_drawn(
     if exact_arm and not case.cell.align and not case.also:
         promises['shares'] = list(_of_shares(case, found))
     promises['parameters'] = list(_of_parameters(named, found))
-    true = true_test(case)
+    # Without what jitters in stamps: how well somebody stamps a motion to come is no matter of a model.
+    true = case.recorded('test', exact(case.cell.tracker))
     promises |= {kind: [told] for kind, told in _of_path(found, recordings[0], true)}
     regions = of_motion(found, recordings[0], true, case)
     return {**entry, **regions, 'promises': promises}, found
-
-
-def _besides(case: SealedCase, seed: int, number: int) -> list[Cause]:
-    """Return small errors at all places where no cause of a case is."""
-    rng = np.random.default_rng([seed, number, 1])
-    part, robot = float(np.exp(rng.uniform(*np.log(PART)))), case.cell.robot
-    there = {site(cause) for cause in case.causes}
-    return [cause for cause in small_errors(robot, rng, part) if site(cause) not in there]
 
 
 def of_motion(
@@ -128,16 +124,20 @@ def of_motion(
     train, test: the motion is seen where the tool really is.
     case: for an oracle, which knows its causes.
     """
-    assert test.measured is not None
+    good, out = within(test), {}
+    for region, mask in _regions(found, test, good):
+        out[region] = held(found, train, test, np.full(good.size, ROUNDING), mask)
+        out[region] |= {} if case is None else oracle_sigma(case, (train, test), mask)
+    return out
+
+
+def _regions(found: Diagnosis, test: Recording, good: Mask) -> Iterator[tuple[str, Mask]]:
+    """Yield which good measurements lie inside of what was recorded, and outside, where enough do."""
     assert found.posterior is not None
-    beyond = flagged(found.posterior, test, test.measured.t)
-    good, sigma = within(test, test.measured), np.full(test.measured.t.size, ROUNDING)
-    out = {}
+    beyond = flagged(found.posterior, test, measured_of(test).t)
     for region, mask in (('inside', good & ~beyond), ('outside', good & beyond)):
         if mask.sum() >= FEWEST:
-            out[region] = held(found, train, test, sigma, mask)
-            out[region] |= {} if case is None else oracle_sigma(case, (train, test), mask)
-    return out
+            yield region, mask
 
 
 def _of_path(
@@ -149,13 +149,11 @@ def _of_path(
     As it is meant by the nominal arm, before; and where the model has the tool, after. RMS over the
     way, and the largest distance that is kept with 95 %: the user's tolerance.
     """
-    measured, posterior = test.measured, found.posterior
-    assert measured is not None
+    measured, posterior = measured_of(test), found.posterior
     assert posterior is not None
-    inside = within(test, measured) & ~flagged(posterior, test, measured.t)
-    here = np.flatnonzero(inside)
+    here = np.flatnonzero(dict(_regions(found, test, within(test))).get('inside', False))
     here = here[max(here.size - PATH, 0) // 2 :][:PATH]
-    if here.size < FEWEST:
+    if not here.size:
         return
     t, real = measured.t[here], measured.position[here]
     twin = twin_for(found.model, train, test)
@@ -171,34 +169,19 @@ def _of_path(
         yield f'path {when}, within (95 %)', {'ci90': [0.0, sure], 'true': float(off.max())}
 
 
-def true_test(case: SealedCase) -> Recording:
-    """
-    Return the sealed motion as it is, seen where the tool really is.
-
-    Without what jitters in stamps: how well somebody stamps a motion to come is no matter of a model.
-    """
-    return as_recording(
-        'test', record(case.cell, case.causes, case.test, exact(case.cell.tracker))
-    )
-
-
 def _of_shrink(
     case: SealedCase, found: Diagnosis, train: Recording
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the shrink that is told, and that on the sealed motion, inside and outside."""
-    test = as_recording('test', record(case.cell, case.causes, case.test))
-    assert test.measured is not None
+    test = case.recorded('test')
     assert found.shrink is not None
-    assert found.posterior is not None
     bare = nominal_on(case.cell.robot, found.model.known, train, case.cell.align)
     before, after = (np.linalg.norm(gap_on(m, test), axis=1) for m in (bare, found.model))
     # An instrument's outliers are nobody's shrink.
-    good = within(test, test.measured) & (after < GROSS * np.median(after))
-    beyond = flagged(found.posterior, test, test.measured.t)
-    for region, mask in (('inside', good & ~beyond), ('outside', good & beyond)):
-        if mask.sum() >= FEWEST:
-            true = rms(after[mask, None]) / rms(before[mask, None])
-            yield region, told_shrink(found.shrink, true, region)
+    good = within(test) & (after < GROSS * np.median(after))
+    for region, mask in _regions(found, test, good):
+        true = rms(after[mask, None]) / rms(before[mask, None])
+        yield region, told_shrink(found.shrink, true, region)
 
 
 def told_shrink(told: Shrink, true: float, region: str) -> dict[str, Any]:
@@ -238,15 +221,12 @@ def _of_parameters(named: Sequence[Cause], found: Diagnosis) -> Iterator[dict[st
 
 HOLD = 0.9
 """Share of the errors that a region promises to hold."""
-Mask = NDArray[np.bool_]
 
 
 def inside_region(errors: Array, covariances: Array, sigma: Array) -> Mask:
     """
-    Return which errors lie in their 90 % region, shape (M,).
+    Return which errors (M, 3) [m] lie in their 90 % region, shape (M,).
 
-    errors: measured minus predicted, shape (M, 3) [m].
-    covariances: of the true position about the predicted one, shape (M, 3, 3) [m^2].
     sigma: noise of the instrument per axis, shape (M,) [m]; it comes on top.
     """
     whole = covariances + (sigma**2)[:, None, None] * np.eye(3)
@@ -264,15 +244,13 @@ def held(
     """
     Return how well the regions hold on a recording that was not fitted, as plain JSON values.
 
-    diagnosis: of ``train``.
     sigma: the instrument's noise at the other's measurements, shape (M,) [m].
     good: measurements that count, shape (M,).
     """
-    posterior, measured = diagnosis.posterior, other.measured
+    posterior, measured = diagnosis.posterior, measured_of(other)
     assert posterior is not None
-    assert measured is not None
     twin = twin_for(diagnosis.model, train, other)
-    use = within(other, measured) if good is None else good & within(other, measured)
+    use = within(other) if good is None else good & within(other)
     t = measured.t[use]
     expected, covariances = expected_poses(posterior, twin, other, t)
     errors = measured.position[use] - expected.position
@@ -297,12 +275,10 @@ def twin_for(model: Model, train: Recording, other: Recording) -> Twin:
     return Model(model.robot, model.bases[:1], model.known, found).twin(0)
 
 
-def within(other: Recording, measured: Measurements) -> Mask:
+def within(other: Recording) -> Mask:
     """Return which measurements lie inside the joint stream, shape (M,)."""
-    if other.joints.static:
-        return np.ones(measured.t.size, dtype=bool)
-    ends = other.joints.t[[0, -1]]
-    return np.asarray((measured.t >= ends[0]) & (measured.t <= ends[1]))
+    inside = np.asarray(counted(other, []), dtype=bool)
+    return np.ones_like(inside) if other.joints.static else inside
 
 
 def _mean(values: Array | Mask) -> float | None:
@@ -342,12 +318,12 @@ def oracle_sigma(
     found, scale = robust_fit(problem, start.with_found(causes))
     own = replace(scale, position=cell.tracker.sigma)
     posterior = _posterior(problem, found, own, train)
-    if not posterior.directions.count or other.measured is None:
+    if not posterior.directions.count:
         return {}
-    at = other.measured.t[mask]
+    at = measured_of(other).t[mask]
     twin = twin_for(found.model, train, other)
     covariances = pose_covariances(posterior, twin, other, at)[:, :3, :3]
-    errors = other.measured.position[mask] - twin.poses(other, at).position
+    errors = measured_of(other).position[mask] - twin.poses(other, at).position
     missed = _missed(errors, covariances)
     return {
         'formal_sigma_m': float(np.median(largest_sigma(covariances))),

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 from weld_twin_core.diagnosis.predicting.planned import (
@@ -30,12 +29,12 @@ from weld_twin_nodes.offline.task_pool import Task
 
 from ..blind.blind_cell import at_stations
 from ..blind.cause_sizes import small_errors
-from ..blind.scoring import rms
+from ..blind.scoring import measured_of, rms
 from ..plant.tracker import Tracker
 from ..programs.sealed_seams import CELLS
 from ..real_arms.sources import TUNED_ON, Split, all_splits
 from ..real_arms.unseen import ALIGN, plain_fit, residual
-from ..study import Study, head, require_simulator, tabled
+from ..study import Study, head, require_simulator, shown, tabled
 from .others import of_seam, of_touches, of_years
 from .sealed import held, of_case, told_shrink
 
@@ -60,8 +59,6 @@ def carried_out(seed: int) -> dict[str, Any]:
     Return what a plan promised, what the diagnosis of its stations warns of, and what an arm keeps.
 
     The arm is corrected with the effects in the middle of the allowed models.
-
-    seed: decides arm, its errors, the count and the noise.
     """
     rng = np.random.default_rng(seed)
     robot = catalog.load(ARMS[seed % len(ARMS)])
@@ -78,7 +75,6 @@ def carried_out(seed: int) -> dict[str, Any]:
     still = Recording('others', JointMotion(np.arange(float(len(others))), others, static=True))
     middle, _ = expected_poses(found.posterior, found.model.twin(0), still, still.joints.t)
     off = true - middle.position
-    length = np.linalg.norm(off, axis=1)
     judged = clear_postures(robot, SPREAD)[:JUDGED]
     return {
         'seed': seed,
@@ -91,7 +87,7 @@ def carried_out(seed: int) -> dict[str, Any]:
         'warned_elsewhere_m': found.posterior.anywhere_m,
         'promised_within': float(plan.within[-1]),
         'kept_sigma_m': float(largest_sigma(np.einsum('mi,mj->ij', off, off)[None] / len(off))[0]),
-        'kept_within': float((length < TOLERANCE).mean()),
+        'kept_within': float((np.linalg.norm(off, axis=1) < TOLERANCE).mean()),
     }
 
 
@@ -139,12 +135,18 @@ def _of_split(ur5: str, ur10: str, name: str) -> dict[str, Any]:
     split = _splits(ur5, ur10)[name]
     group = 'tuned on' if split.robot == 'ur5' and split.kind in TUNED_ON else 'unseen'
     entry: dict[str, Any] = {'name': split.name, 'source': split.robot, 'group': group}
-    found = _tried(lambda: diagnose([split.train], catalog.load(split.robot), align=ALIGN), entry)
-    if found is None:
+    try:
+        found = diagnose([split.train], catalog.load(split.robot), align=ALIGN)
+    except TwinError as error:
+        return {**entry, 'refused': str(error)}
+    entry['status'] = found.status
+    if found.posterior is None:
         return entry
     for region, other in (('inside', split.inside), ('outside', split.outside)):
-        if other is not None and other.measured is not None and other.measured.t.size:
-            entry[region] = held(found, split.train, other, _noise(other))
+        if other is not None:
+            seen = measured_of(other)
+            noise = np.full(seen.t.size, UR5_NOISE) if seen.sigma is None else seen.sigma
+            entry[region] = held(found, split.train, other, noise)
             told = _of_shrink(split, other, found, region)
             entry.setdefault('promises', {})[f'shrink on the real arms, {region} (95 %)'] = [told]
     return entry
@@ -161,24 +163,6 @@ def _of_shrink(split: Split, other: Recording, found: Diagnosis, region: str) ->
     return {**told, 'ci90': told['ci95']}
 
 
-def _tried(work: Callable[[], Diagnosis], entry: dict[str, Any]) -> Diagnosis | None:
-    """Return a diagnosis with a posterior; None, and why in the entry, where there is none."""
-    try:
-        found = work()
-    except TwinError as error:
-        entry['refused'] = str(error)
-        return None
-    entry['status'] = found.status
-    return found if found.posterior is not None else None
-
-
-def _noise(other: Recording) -> Array:
-    assert other.measured is not None
-    if other.measured.sigma is not None:
-        return other.measured.sigma
-    return np.full(other.measured.t.size, UR5_NOISE)
-
-
 Entry = dict[str, Any]
 REGIONS = ('inside', 'outside')
 HEAD = """# What 90 % regions of predictions hold
@@ -192,7 +176,12 @@ def page(entries: Sequence[Entry]) -> str:
     """Return the summary, what became of other promises, and the table of every recording."""
     plans = [entry for entry in entries if 'promised_within' in entry]
     rest = [entry for entry in entries if 'source' in entry]
-    rows = [(entry, region) for entry in rest for region in REGIONS if region in entry]
+    rows = [
+        {**entry, 'region': region, **entry[region]}
+        for entry in rest
+        for region in REGIONS
+        if region in entry
+    ]
     tables = [tabled(SUMMARIES, summaries(rest)), promise_table(rest), tabled(ENTRIES, rows)]
     if plans:
         told = ', '.join(f'{key} {value:.3g}' for key, value in of_plans(plans).items())
@@ -233,34 +222,22 @@ def promise_table(entries: Sequence[Entry]) -> str:
         true = np.array([one['true'] for one in told])
         above, below = true > ends[:, 1], true < ends[:, 0]
         width = np.median((ends[:, 1] - ends[:, 0]) / np.maximum(np.abs(true), 1e-12))
-        rows.append(
-            [
-                kind,
-                str(true.size),
-                f'{1.0 - (above | below).mean():.1%}',
-                f'{below.mean():.1%}',
-                f'{above.mean():.1%}',
-                f'{width:.3f}',
-            ]
-        )
+        shares = (1.0 - (above | below).mean(), below.mean(), above.mean())
+        rows.append((kind, true.size, *(f'{share:.1%}' for share in shares), f'{width:.3f}'))
     heads = ('interval of', 'number', 'held', 'truth below', 'above', 'width over the truth')
     return table(heads, *rows)
 
 
 def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Return the mean share held over recordings, by source, group and region."""
-    out = []
-    keys = dict.fromkeys((e['source'], e['group']) for e in entries)
-    for source, group in keys:
-        for region in REGIONS:
-            mine = [
-                e[region]
-                for e in entries
-                if (e['source'], e['group']) == (source, group) and region in e
-            ]
-            if mine:
-                out.append(_summary(source, group, region, mine))
-    return out
+    kinds = dict.fromkeys((e['source'], e['group'], r) for e in entries for r in REGIONS)
+    parts = {
+        kind: [
+            e[kind[2]] for e in entries if (e['source'], e['group']) == kind[:2] and kind[2] in e
+        ]
+        for kind in kinds
+    }
+    return [_summary(*kind, mine) for kind, mine in parts.items() if mine]
 
 
 def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dict[str, Any]:
@@ -285,48 +262,31 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
     }
 
 
-def _share(value: float | None, digits: int = 0) -> str:
-    return '' if value is None else f'{value:.{digits}%}'
-
-
-def _of(key: str, tell: Callable[[Any], str]) -> Callable[[Any], str]:
-    """Return what tells a number of a recording in a region."""
-    return lambda row: tell(row[0][row[1]][key])
-
-
-def _mm(value: float | None) -> str:
-    return '' if value is None else f'{value * 1e3:.3f} mm'
-
-
-def _wide(key: str) -> Callable[[Any], str]:
-    return lambda s: '' if s[key] is None else f'{s[key]:.2f}'
-
-
 SUMMARIES: dict[str, Callable[[Any], object]] = {
     'of': itemgetter('source'),
     'group': itemgetter('group'),
     'poses': itemgetter('region'),
     'recordings': itemgetter('recordings'),
-    'held': lambda s: _share(s['held'], 1),
-    'of all poses': lambda s: _share(s['held_of_all_poses'], 1),
-    'worst': lambda s: _share(s['worst']),
-    'flagged': lambda s: _share(s['flagged'], 1),
-    'width over the oracle': _wide('over_oracle'),
-    'over its formal one': _wide('over_formal'),
+    'held': shown('held', by='{:.1%}'),
+    'of all poses': shown('held_of_all_poses', by='{:.1%}'),
+    'worst': shown('worst', by='{:.0%}'),
+    'flagged': shown('flagged', by='{:.1%}'),
+    'width over the oracle': shown('over_oracle', by='{:.2f}'),
+    'over its formal one': shown('over_formal', by='{:.2f}'),
 }
 """Columns of the table of summaries."""
 ENTRIES: dict[str, Callable[[Any], object]] = {
-    'recording': lambda row: row[0]['name'],
-    'status': lambda row: row[0]['status'],
-    'poses': itemgetter(1),
-    'number': _of('poses', str),
-    'held': _of('held', _share),
-    'not flagged': _of('held_unflagged', _share),
-    'flagged': _of('flagged', _share),
-    'mean error': _of('mean_error_m', _mm),
-    'sigma': _of('median_sigma_m', _mm),
+    'recording': shown('name'),
+    'status': itemgetter('status'),
+    'poses': itemgetter('region'),
+    'number': itemgetter('poses'),
+    'held': shown('held', by='{:.0%}'),
+    'not flagged': shown('held_unflagged', by='{:.0%}'),
+    'flagged': shown('flagged', by='{:.0%}'),
+    'mean error': shown('mean_error_m', by='{:.3f} mm', times=1e3),
+    'sigma': shown('median_sigma_m', by='{:.3f} mm', times=1e3),
 }
-"""Columns of the table of recordings, each with a region."""
+"""Columns of the table of recordings, each with what holds in a region of its own."""
 
 
 def run(study: Study) -> None:

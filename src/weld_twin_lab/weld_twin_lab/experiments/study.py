@@ -46,7 +46,7 @@ from weld_twin_report.report.diagnosis_files import diagnosis_text
 from ..belief.learning import Weights, fitted
 from ..blind.blind_cell import RATE, WAYS, Motion, as_recording, of_motion, record
 from ..blind.making import Lot, SealedCase, draw_case, lots, one_arm
-from ..blind.scoring import Judged, judge
+from ..blind.scoring import Judged, in_words, judge
 from ..blind.seal import text_digest
 from ..gate.mistakes import seen_from
 from ..study import Study, engine_digest, head, require_simulator, tabled
@@ -190,8 +190,6 @@ ELSEWHERE = transform(
     Rotation.from_rotvec([0.05, -0.03, 0.7]).as_matrix(), np.array([1.2, -0.9, 0.1])
 )
 """The frame of before in that of an instrument at another place, turned another way."""
-STAY = 15.0
-"""A station with the way to it [s], as experiments are planned."""
 
 
 class SealedCell:
@@ -286,10 +284,6 @@ def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
     return Motion(even, np.asarray(CubicSpline(t - t[0], q)(even)))
 
 
-def stations(q: Array) -> Motion:
-    return Motion(STAY * np.arange(len(q), dtype=float), q, static=True)
-
-
 SIGNS = ('own', 'same', 'against')
 """Log odds of the answer, and those of the other diagnosis that speak for it, or against it."""
 COUNTS = np.array([1.0, 1.0, -1.0])
@@ -332,7 +326,6 @@ def heard(cases: Sequence[Mapping[str, Any]]) -> Heard:
 
 
 def weights(taught: Heard) -> Weights:
-    """Return what each sign counts, and what is added."""
     ones = np.ones(len(taught.right))
     prior = np.array([1.0, 0.0, 0.0])
     return fitted(taught.signs, taught.right, COUNTS, RIDGE, ones, prior)
@@ -367,16 +360,12 @@ def closing_page(cases: Sequence[Mapping[str, Any]]) -> str:
     fit, probability = weights(all_), unseen(all_)
     learned = zip((*SIGNS, 'added'), (*fit.slopes, fit.bias), strict=True)
     rows = [(f'{least:.2f}', *map(str, reached(all_, probability, least))) for least in TRIED]
-    return '\n'.join(
-        [
-            f'{len(all_.right)} answers of {len(np.unique(all_.cell))} cells',
-            '',
-            markdown.table(('sign', 'counts'), *((name, f'{v:.2f}') for name, v in learned)),
-            '',
-            markdown.table(('believed from', 'right', 'wrong'), *rows),
-            '',
-        ]
+    parts = (
+        f'{len(all_.right)} answers of {len(np.unique(all_.cell))} cells',
+        markdown.table(('sign', 'counts'), *((name, f'{v:.2f}') for name, v in learned)),
+        markdown.table(('believed from', 'right', 'wrong'), *rows),
     )
+    return '\n\n'.join(parts) + '\n'
 
 
 Case = dict[str, Any]
@@ -385,52 +374,35 @@ Case = dict[str, Any]
 def summary(cases: Sequence[Case]) -> dict[str, Any]:
     if not cases:
         return {'cells': 0}
+    ends = [case['loop'] for case in cases]
+    minutes = [case['minutes'] for case in cases if case['loop']['right'] and case['loop']['sure']]
     rounds = [step for case in cases for step in case['rounds']]
-    certain = [case for case in cases if case['loop']['right'] and case['loop']['sure']]
+    # How often experiments decided, beside what they had said.
+    judged = [step for step in rounds if step['decided'] is not None]
+    promised = [step for step in judged if (step['promise'] or 0.0) >= SAID]
     return {
         'cells': len(cases),
         'first': dict(sorted(Counter(str(c['first']['status']) for c in cases).items())),
-        'right_and_sure': len(certain),
-        'right': _count(cases, lambda c: c['loop']['right']),
-        'sure_and_wrong': _count(cases, lambda c: c['loop']['sure'] and not c['loop']['right']),
-        'minutes_to_certainty': float(np.median([c['minutes'] for c in certain]))
-        if certain
-        else None,
+        'right_and_sure': len(minutes),
+        'right': sum(bool(end['right']) for end in ends),
+        'sure_and_wrong': sum(bool(end['sure'] and not end['right']) for end in ends),
+        'minutes_to_certainty': float(np.median(minutes)) if minutes else None,
         'experiments': len(rounds),
-        **_promises(rounds),
-        'seconds': max((step['seconds'] for step in rounds), default=0.0),
-    }
-
-
-def _promises(rounds: Sequence[Case]) -> dict[str, Any]:
-    """Return how often experiments decided, beside what they had said."""
-    judged = [step for step in rounds if step['decided'] is not None]
-    said = [step for step in judged if (step['promise'] or 0.0) >= SAID]
-    return {
         'that_compared': len(judged),
         'foreseen': sum(step['promise'] or 0.0 for step in judged),
-        'decided': _count(judged, lambda step: step['decided']),
-        'said_they_would': len(said),
-        'of_these_decided': _count(said, lambda step: step['decided']),
+        'decided': sum(bool(step['decided']) for step in judged),
+        'said_they_would': len(promised),
+        'of_these_decided': sum(bool(step['decided']) for step in promised),
+        'seconds': max((step['seconds'] for step in rounds), default=0.0),
     }
-
-
-def _count(cases: Sequence[Case], holds: Callable[..., bool]) -> int:
-    return sum(bool(holds(case)) for case in cases)
 
 
 def page(result: dict[str, Any]) -> str:
     totals, cases = result['summary'], result['cases']
     if not cases:
         return 'No cell was left open.\n'
-    return '\n'.join(
-        [
-            *(f'- {key}: {totals[key]}' for key in totals if not isinstance(totals[key], dict)),
-            '',
-            tabled(COLUMNS, cases),
-            '',
-        ]
-    )
+    lines = [f'- {key}: {value}' for key, value in totals.items() if not isinstance(value, dict)]
+    return '\n'.join([*lines, '', tabled(COLUMNS, cases), ''])
 
 
 def _in_words(answer: dict[str, Any]) -> str:
@@ -443,9 +415,7 @@ COLUMNS: dict[str, Callable[[Case], object]] = {
     'cell': lambda case: case['name'],
     'robot': lambda case: case['truth']['robot'],
     'first motion': lambda case: f'{case["truth"]["motion"]}, {case["poor"]}',
-    'causes': lambda case: ' + '.join(
-        ' of '.join(filter(None, site)) for site in case['truth']['sites']
-    ),
+    'causes': lambda case: in_words(case['truth']['sites']),
     'first': lambda case: _in_words(case['first']),
     'asked': lambda case: ', '.join(
         f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']
@@ -467,11 +437,7 @@ BATCH = 8
 def investigated(
     seed: int, wanted: int, runner: Runner, tell: Callable[[str], None], *, minutes: float
 ) -> dict[str, Any]:
-    """
-    Investigate as many sealed cells as are wanted that poor motions leave open.
-
-    minutes: no further cells are begun after so long.
-    """
+    """Investigate as many cells as wanted that poor motions leave open, begun within some minutes."""
     end = time.monotonic() + 60.0 * minutes
     drawn: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
@@ -528,7 +494,6 @@ def run(study: Study) -> None:
 
 
 def _kept(tables: Sequence[str]) -> list[Case]:
-    """Return the cells of tables; refuse what is none."""
     out: list[Case] = []
     for table in tables:
         try:

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,8 +46,6 @@ SEASONS = {'link_length': (1e-5, 8e-5), 'joint_offset': (3e-5, 3e-4)}
 
 
 class Event(NamedTuple):
-    """One thing that happens."""
-
     kind: str
     """'step', 'trend' or 'season'."""
     name: str
@@ -81,8 +79,6 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Year:
-    """A year of a cell."""
-
     events: tuple[Event, ...]
     weeks: tuple[int, ...]
     """Those with a check."""
@@ -110,7 +106,6 @@ def year(entry: Entry, rng: np.random.Generator) -> Year:
 
 
 def _showing(entry: Entry) -> list[str]:
-    """Return the coordinates that the check shows."""
     std = np.sqrt(np.diag(entry.covariance))
     return [
         name
@@ -170,7 +165,6 @@ def _wear(free: list[str], rng: np.random.Generator) -> list[Event]:
 
 
 def moved(events: Sequence[Event], week: int) -> dict[str, float]:
-    """Return by how much each coordinate is moved in a week."""
     out: dict[str, float] = {}
     for event in events:
         value = float(event.values(np.array([float(week)]))[0])
@@ -212,8 +206,6 @@ MOVED = 0.05
 
 @dataclass(frozen=True, eq=False)
 class YearlyCell:
-    """A cell, and the checks it is measured with."""
-
     cell: BlindCell
     as_built: tuple[Cause, ...]
     """Its flaws on the first day."""
@@ -245,19 +237,17 @@ def set_up(rng: np.random.Generator) -> Cause:
 
 
 def diagnosed(
-    yearly: YearlyCell, causes: Sequence[Cause], check: int, seed: int, place: Path, at: datetime
+    yearly: YearlyCell, causes: Sequence[Cause], check: int, seed: int, at: datetime
 ) -> Entry:
     """Return the entry of one check: simulated, written as a bag, diagnosed by the command."""
     taken = yearly.checks[check]._replace(seed=seed)
     made = as_recording('check', record(yearly.cell, causes, taken))
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
-    write_recording(place / 'bag', made, yearly.cell.robot)
-    write_robot_yaml(place / 'robot.yaml', yearly.cell.robot)
-    words = ('diagnose', place / 'bag', '--robot', place / 'robot.yaml', '--align', 'base')
-    said = weld_twin(*words, '--out', place / 'found')
-    if said.code:
-        raise DataError(f'{place}: {said.err.strip() or said.out.splitlines()[0]}')
-    entry = entry_of(place / 'found', at)
-    shutil.rmtree(place)
-    return entry
+    with TemporaryDirectory(prefix='years-') as folder:
+        place = Path(folder)
+        write_recording(place / 'bag', made, yearly.cell.robot)
+        write_robot_yaml(place / 'robot.yaml', yearly.cell.robot)
+        words = ('diagnose', place / 'bag', '--robot', place / 'robot.yaml', '--align', 'base')
+        said = weld_twin(*words, '--out', place / 'found')
+        if said.code:
+            raise DataError(f'{place}: {said.err.strip() or said.out.splitlines()[0]}')
+        return entry_of(place / 'found', at)

@@ -11,12 +11,10 @@ the years that are diagnosed in full, whose every check is simulated and diagnos
 
 from __future__ import annotations
 
-import tempfile
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -62,7 +60,6 @@ def score(
     """
     Return what a year of weekly looks came to: its events, and the alarms for nothing.
 
-    observations: of each check, in the order of time; day 0 is that of week 0.
     named, likely: coordinates that a diagnosis has named as causes, and that use can change.
     truth: values before anything happened.
     """
@@ -137,17 +134,14 @@ def _widened(observation: Observation, names: Sequence[str]) -> Array:
 def _same(event: Event, change: Change, joints: Sequence[str]) -> bool:
     """Tell whether a change told may be an event: its coordinate among those told, its date near."""
     names = {change.name, *change.alike}
-    if not any(_alias(event.name, name, joints) for name in names):
+    if event.name not in names and not any(
+        {_site(event.name, joints), _site(name, joints)} == {TOOL} for name in names
+    ):
         return False
     if event.kind != 'step' or change.kind == 'season':
         return True
     first, last = change.between
     return first - NEAR * WEEK <= event.begin * WEEK <= last + NEAR * WEEK
-
-
-def _alias(one: str, other: str, joints: Sequence[str]) -> bool:
-    """Tell whether two coordinates are the same, or the last joint's row and the tool."""
-    return one == other or {_site(one, joints), _site(other, joints)} == {TOOL}
 
 
 def _entry(
@@ -348,7 +342,6 @@ def _share(flags: Sequence[bool]) -> float | None:
 
 
 def page(result: Mapping[str, Any], seed: int, cells: int) -> str:
-    """Return the page of drawn years of so many cells."""
     drawn, full = result['drawn'], result['full']
     rows = [
         (words, _goal(name), _value(drawn, name), _value(full, name))
@@ -363,17 +356,11 @@ def page(result: Mapping[str, Any], seed: int, cells: int) -> str:
         f'Real changes: {drawn["real"]} and {full["real"]}; forecasts: {drawn["forecasts"]} and '
         f'{full["forecasts"]}; looks: {drawn["checks"]} and {full["checks"]}. In time by kind:'
     )
+    command = f'--seed {seed} --years {drawn["years"]} --cells {cells} --full {full["years"]}'
     parts = (
-        f'# Simulated years\n\n`weld-twin lab years --seed {seed} --years {drawn["years"]} '
-        f'--cells {cells} --full {full["years"]}`\n',
-        LEAD,
-        markdown.table(heads, *rows),
-        '',
-        counts,
-        '',
-        markdown.table(('kind', 'drawn', 'in full'), *kinds),
-        '',
-        COUNTED,
+        f'# Simulated years\n\n`weld-twin lab years {command}`\n\n{LEAD}',
+        f'{markdown.table(heads, *rows)}\n\n{counts}\n',
+        f'{markdown.table(("kind", "drawn", "in full"), *kinds)}\n\n{COUNTED}',
     )
     return '\n'.join(parts)
 
@@ -401,14 +388,10 @@ CHECKS = 2
 
 
 def base(seed: int, number: int, check: int) -> dict[str, Any]:
-    """Return the entry of one check of a cell on its first day."""
     rng = np.random.default_rng([seed, number, check])
     yearly = draw(seed, number)
     causes = [*yearly.as_built, set_up(rng)]
-    drawn = int(rng.integers(2**31))
-    with tempfile.TemporaryDirectory(prefix='years-') as place:
-        entry = diagnosed(yearly, causes, check, drawn, Path(place) / 'check', FIRST)
-    return entry.plain()
+    return diagnosed(yearly, causes, check, int(rng.integers(2**31)), FIRST).plain()
 
 
 def lived(seed: int, number: int, first: Mapping[str, Any]) -> Year:
@@ -423,10 +406,7 @@ def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[
     causes = [*_together([*yearly.as_built, *(cause(n, v) for n, v in off.items())]), stands]
     drawn = int(np.random.default_rng([seed, number, 4, week]).integers(2**31))
     at = FIRST + timedelta(weeks=week)
-    with tempfile.TemporaryDirectory(prefix='years-') as place:
-        stations = set_up_number % CHECKS
-        entry = diagnosed(yearly, causes, stations, drawn, Path(place) / 'check', at)
-    return entry.plain()
+    return diagnosed(yearly, causes, set_up_number % CHECKS, drawn, at).plain()
 
 
 def _together(causes: Sequence[Cause]) -> list[Cause]:
@@ -477,54 +457,38 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
     arm = rng.multivariate_normal(checks[0].value, checks[0].covariance, method='eigh')
     truth = dict(zip(checks[0].names, map(float, arm), strict=True))
     seen = drawn(checks, lived, truth, rng)
-    return score(seen, lived, named(checks), likely(checks), _joints(checks[0]), truth)
+    joints = [name.split(' ')[1] for name in truth if name.startswith('joint_offset ')]
+    return score(seen, lived, named(checks), likely(checks), joints, truth)
 
 
 def _common(entries: Sequence[Entry]) -> list[Entry]:
     """Return entries with only the coordinates that all have, in the same order."""
     names = [n for n in entries[0].names if all(n in each.names for each in entries)]
-    out = []
-    for each in entries:
+
+    def own(each: Entry) -> Entry:
         at = [each.names.index(name) for name in names]
-        out.append(
-            replace(
-                each,
-                names=tuple(names),
-                value=each.value[at],
-                prior_std=each.prior_std[at],
-                covariance=each.covariance[np.ix_(at, at)],
-            )
-        )
-    return out
+        some: dict[str, Any] = {'value': each.value[at], 'prior_std': each.prior_std[at]}
+        covariance = each.covariance[np.ix_(at, at)]
+        return replace(each, names=tuple(names), covariance=covariance, **some)
+
+    return [own(each) for each in entries]
 
 
 def drawn(
     checks: Sequence[Entry], lived: Year, truth: Mapping[str, float], rng: np.random.Generator
 ) -> list[Observation]:
     """Return the observations of a year: the arm as it is each week, seen through a check."""
-    seen = observations(checks)
-    shown = [each.information()[0] for each in seen]
-    roots = [_root(each) for each in shown]
-    out = []
+    seen, out = observations(checks), []
     for week, number in zip(lived.weeks, lived.set_ups, strict=True):
-        k = number % len(checks)
-        check = seen[k]
+        check = seen[number % len(checks)]
         off = moved(lived.events, week)
         theta = np.array([truth[name] + off.get(name, 0.0) for name in check.names])
-        information = shown[k] @ theta + roots[k] @ rng.normal(size=theta.size)
-        value = check.covariance @ information
-        out.append(replace(check, day=WEEK * week, value=value))
+        precision = check.information()[0]
+        known, axes = np.linalg.eigh(precision)
+        root = axes * np.sqrt(np.maximum(known, 0.0))
+        information = precision @ theta + root @ rng.normal(size=theta.size)
+        out.append(replace(check, day=WEEK * week, value=check.covariance @ information))
     return out
-
-
-def _root(precision: Array) -> Array:
-    known, axes = np.linalg.eigh(precision)
-    return np.asarray(axes * np.sqrt(np.maximum(known, 0.0)))
-
-
-def _joints(check: Entry) -> list[str]:
-    family = 'joint_offset '
-    return [name.split(' ')[1] for name in check.names if name.startswith(family)]
 
 
 def run(study: Study) -> bool:

@@ -21,7 +21,7 @@ from weld_twin_core.recording import Measurements, Recording
 from ..blind.blind_cell import BlindCell, as_recording, draw_cell, poorer, record, take
 from ..blind.cause_sizes import FAMILIES, MOVING, OUTSIDE, Cause
 from ..blind.making import ROBOTS, STRATA, NotVisible, draw_causes
-from ..blind.scoring import rms
+from ..blind.scoring import measured_of, rms
 
 STEPS = ('station_step', 'tool_slip')
 """Causes that are mistakes of the set-up as well; they are drawn there."""
@@ -33,16 +33,14 @@ TRIES = 40
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """A sound recording."""
-
     robot: Robot
     """The nominal arm with its tool as it is told to the diagnosis."""
     recording: Recording
     align: tuple[str, ...]
     real: Robot
     """The same arm with its tool as it is; the base as it was told."""
-    about: dict[str, object]
-    """Robot, motion, causes, how the motion was made poor."""
+    about: dict[str, Any]
+    """Robot, motion, frames that are fitted, causes, how the motion was made poor."""
 
 
 def draw(rng: np.random.Generator, *, rich: bool = False) -> Sound:
@@ -70,13 +68,7 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
         causes, _ = draw_causes(cell, families, strata, taken, rng)
     align = ALIGNS[int(rng.integers(len(ALIGNS)))]
     robot, recording = _as_told(cell, as_recording('run', record(cell, causes, taken)), align, rng)
-    about: dict[str, object] = {
-        'robot': name,
-        'motion': kind,
-        'poor': poor,
-        'align': align,
-        'causes': causes,
-    }
+    about = {'robot': name, 'motion': kind, 'poor': poor, 'align': [*align], 'causes': causes}
     return Sound(robot, recording, align, cell.robot, about)
 
 
@@ -94,8 +86,7 @@ def _as_told(
 
 def seen_from(recording: Recording, T: Array) -> Recording:
     """Return the recording with its measurements in another frame, T shape (4, 4)."""
-    seen = recording.measured
-    assert seen is not None
+    seen = measured_of(recording)
     turned = None if seen.rotation is None else T[:3, :3] @ seen.rotation
     position = seen.position @ T[:3, :3].T + T[:3, 3]
     return recording.with_measured(replace(seen, position=position, rotation=turned))
@@ -141,14 +132,9 @@ class Hidden(Exception):
     """The mistake would not show in this recording."""
 
 
-def _seen(recording: Recording) -> Measurements:
-    assert recording.measured is not None
-    return recording.measured
-
-
 def _measured(sound: Sound, said: str, **changes: Any) -> Made:
     """Return the recording with something else measured."""
-    made = replace(_seen(sound.recording), **changes)
+    made = replace(measured_of(sound.recording), **changes)
     return sound.robot, sound.recording.with_measured(made), said
 
 
@@ -170,7 +156,7 @@ def _inner(sound: Sound, rng: np.random.Generator) -> int:
     """Return a joint that moves and that no fitted frame can stand in for."""
     n = sound.robot.n
     low = 1 if 'base' in sound.align else 0
-    high = n - 1 if 'tool' in sound.align or _seen(sound.recording).rotation is None else n
+    high = n - 1 if 'tool' in sound.align or measured_of(sound.recording).rotation is None else n
     inner = [i for i in range(low, high) if _range(sound)[i] > VISIBLE]
     if not inner:
         raise Hidden('no joint moves')
@@ -197,11 +183,10 @@ def units(sound: Sound, rng: np.random.Generator) -> Made:
     if what == 'one axis':
         factor = np.ones(3)
         factor[int(rng.integers(3))] = 1e3
-    return _measured(sound, what, position=_seen(sound.recording).position * factor)
+    return _measured(sound, what, position=measured_of(sound.recording).position * factor)
 
 
 def joints_swapped(sound: Sound, rng: np.random.Generator) -> Made:
-    """Swap two joints that move."""
     moving = np.flatnonzero(_range(sound) > VISIBLE)
     if moving.size < 2:
         raise Hidden('fewer than two joints move')
@@ -217,7 +202,7 @@ def sign(sound: Sound, rng: np.random.Generator) -> Made:
     if rng.random() < 0.25:
         factor = np.ones(3)
         factor[int(rng.integers(3))] = -1.0
-        mirrored = _seen(sound.recording).position * factor
+        mirrored = measured_of(sound.recording).position * factor
         return _measured(sound, 'mirror', position=mirrored, rotation=None)
     i = _inner(sound, rng)
     matrix = np.eye(sound.robot.n)
@@ -297,7 +282,7 @@ def _untaken(robot: Robot, q: Array, poses: Array) -> float:
 
 def _middle(sound: Sound, rng: np.random.Generator) -> Array:
     """Return which measurements come after an instant drawn from the middle, bool (M,)."""
-    count = _seen(sound.recording).t.size
+    count = measured_of(sound.recording).t.size
     return np.asarray(np.arange(count) >= int(count * rng.uniform(0.3, 0.7)))
 
 
@@ -312,7 +297,7 @@ def reflector_jumped(sound: Sound, rng: np.random.Generator) -> Made:
     """Have the reflector sit elsewhere in its nest from some instant on."""
     after, size = _middle(sound, rng), float(rng.uniform(5e-4, 5e-3))
     way = _direction(rng) * size
-    seen = _seen(sound.recording)
+    seen = measured_of(sound.recording)
     q = sound.recording.joints.at(seen.t)[0]
     turns = _frame_of(sound, seen, q) @ forward(sound.real, q)[:, :3, :3]
     position = seen.position + np.where(after[:, None], turns @ way, 0.0)
@@ -331,7 +316,7 @@ def _frame_of(sound: Sound, seen: Measurements, q: Array) -> Array:
 def joint_slipped(sound: Sound, rng: np.random.Generator) -> Made:
     """Have a joint slip, so that the tool is off by 0.5 to 5 mm from some instant on."""
     i, after = _inner(sound, rng), _middle(sound, rng)
-    seen, robot = _seen(sound.recording), sound.real
+    seen, robot = measured_of(sound.recording), sound.real
     q = sound.recording.joints.at(seen.t)[0]
     slip = np.zeros(robot.n)
     slip[i] = 1e-3
@@ -362,7 +347,7 @@ def instrument_knocked(sound: Sound, rng: np.random.Generator) -> Made:
     """Knock the instrument by 0.5 to 5 mm, and turn it a little, at some instant."""
     after, size = _middle(sound, rng), float(rng.uniform(5e-4, 5e-3))
     way, turn = _direction(rng) * size, _direction(rng) * float(rng.uniform(0.0, 1e-3))
-    seen = _seen(sound.recording)
+    seen = measured_of(sound.recording)
     if seen.rotation is None and _turning(sound) < ONE_PLACE:
         raise Hidden('while the tool hardly turns a knock is a jump of the reflector')
     R = Rotation.from_rotvec(turn).as_matrix()
@@ -409,7 +394,7 @@ def zero_velocities(sound: Sound, rng: np.random.Generator) -> Made:
 
 def clock(sound: Sound, rng: np.random.Generator) -> Made:
     """Stamp the measurements by another clock: late, early, faster, or of another epoch."""
-    seen, what = _seen(sound.recording), str(rng.choice(['off', 'off', 'rate', 'epoch']))
+    seen, what = measured_of(sound.recording), str(rng.choice(['off', 'off', 'rate', 'epoch']))
     if what == 'off':
         late = float(rng.uniform(0.2, 3.0) * rng.choice([-1.0, 1.0]))
         t, said = seen.t + late, f'{late:+.2f} s'
@@ -423,7 +408,7 @@ def clock(sound: Sound, rng: np.random.Generator) -> Made:
 
 def other(sound: Sound, rng: np.random.Generator) -> Made:
     """Pair measurements with the wrong rows or motion, miss or double one, or invert orientations."""
-    seen = _seen(sound.recording)
+    seen = measured_of(sound.recording)
     if sound.recording.joints.static and rng.random() < 0.5:
         return _one_off(sound, rng)
     if seen.rotation is not None and rng.random() < 0.5:
@@ -438,7 +423,7 @@ def other(sound: Sound, rng: np.random.Generator) -> Made:
 
 def _one_off(sound: Sound, rng: np.random.Generator) -> Made:
     """Miss a reading, or take it twice, so that all that follow are a row off."""
-    seen = _seen(sound.recording)
+    seen = measured_of(sound.recording)
     each, row = np.arange(seen.t.size), int(seen.t.size * rng.uniform(0.1, 0.8))
     missed = bool(rng.random() < 0.5)
     reading = np.delete(each, row) if missed else np.insert(each, row, row)[:-1]
@@ -452,7 +437,7 @@ def _one_off(sound: Sound, rng: np.random.Generator) -> Made:
 
 def computed(sound: Sound, rng: np.random.Generator) -> Made:
     """Publish the controller's own forward kinematics, nominal or calibrated, as if measured."""
-    seen, robot = _seen(sound.recording), sound.robot
+    seen, robot = measured_of(sound.recording), sound.robot
     if seen.t.size < POSTURES:
         raise Hidden('some rigid arm agrees with so few postures')
     q = sound.recording.joints.at(seen.t)[0]
@@ -469,7 +454,7 @@ def computed(sound: Sound, rng: np.random.Generator) -> Made:
 
 def stamps_in_bursts(sound: Sound, rng: np.random.Generator) -> Made:
     """Keep measurements in a buffer, and stamp them when it is sent."""
-    seen, size = _seen(sound.recording), int(rng.integers(*BUFFER))
+    seen, size = measured_of(sound.recording), int(rng.integers(*BUFFER))
     index = np.arange(seen.t.size)
     last = np.minimum((index // size + 1) * size - 1, index[-1])
     way = np.linalg.norm(seen.position[last] - seen.position, axis=1)
@@ -481,7 +466,7 @@ def stamps_in_bursts(sound: Sound, rng: np.random.Generator) -> Made:
 
 def camera_inverted(sound: Sound, rng: np.random.Generator) -> Made:
     """Give the pose of a fixed board in a camera on the arm, as the camera has it."""
-    seen = _seen(sound.recording)
+    seen = measured_of(sound.recording)
     if seen.rotation is None:
         raise Hidden('a point cannot be inverted')
     return sound.robot, sound.recording.with_measured(seen.inverted()), 'inverted'

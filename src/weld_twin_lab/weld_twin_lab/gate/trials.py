@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -25,6 +24,7 @@ from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.tables import read_table
 from weld_twin_nodes.offline.task_pool import Task
 
+from ..blind.scoring import measured_of
 from ..study import Study, listed, require_simulator
 from .mistakes import KINDS, MOVING_ONLY, Hidden, Made, Sound, draw
 
@@ -47,7 +47,7 @@ def mistake(seed: int, kind: str, way: str, number: int) -> dict[str, Any]:
         'way': way,
         'number': number,
         'what': said,
-        **_plain(sound),
+        **sound.about,
         **verdict,
         **judged(kind, verdict),
     }
@@ -77,19 +77,8 @@ def complaint(seed: int, number: int) -> dict[str, Any]:
     static = sound.recording.joints.static
     way = 'table' if static and rng.random() < 0.5 else 'bag'
     verdict = looked(sound.recording, sound.robot, sound.align, way)
-    return {
-        'number': number,
-        'way': way,
-        **_plain(sound),
-        **verdict,
-        'right': not verdict['kinds'],
-    }
-
-
-def _plain(sound: Sound) -> dict[str, Any]:
-    causes = sound.about['causes']
-    assert isinstance(causes, list)
-    return {**sound.about, 'align': list(sound.align), 'causes': [dict(c) for c in causes]}
+    about = {'number': number, 'way': way, **sound.about}
+    return {**about, **verdict, 'right': not verdict['kinds']}
 
 
 def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str) -> dict[str, Any]:
@@ -100,22 +89,17 @@ def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str)
             read = WAYS[way](recording, robot, Path(folder))
             examined = examine(Given((read,), robot, frozenset(align)))
         except DataError as error:
-            return {
-                'kinds': ['refused'],
-                'alike': [],
-                'dated': [],
-                'sentences': [str(error)],
-                'seconds': 0.0,
-            }
-    alike = [pair for item in examined.unsound for pair in item.alike]
-    alike += [pair for slip in examined.slips for pair in slip.alike]
+            none: dict[str, Any] = {'alike': [], 'dated': []}
+            return {'kinds': ['refused'], **none, 'sentences': [str(error)], 'seconds': 0.0}
+    unsound, slips = examined.unsound, examined.slips
+    alike = [*(item.alike for item in unsound), *(slip.alike for slip in slips)]
     return {
-        'kinds': sorted({item.kind for item in examined.unsound}),
-        'alike': sorted({kind for kind, _ in alike}),
-        'dated': sorted({slip.kind for slip in examined.slips}),
+        'kinds': sorted({item.kind for item in unsound}),
+        'alike': sorted({kind for pairs in alike for kind, _ in pairs}),
+        'dated': sorted({slip.kind for slip in slips}),
         'sentences': [
-            *(item.sentence for item in examined.unsound),
-            *(slip.sentence(read) for slip in examined.slips),
+            *(item.sentence for item in unsound),
+            *(slip.sentence(read) for slip in slips),
         ],
         'seconds': time.perf_counter() - begin,
     }
@@ -128,8 +112,7 @@ def as_bag(recording: Recording, robot: Robot, folder: Path) -> Recording:
 
 def as_table(recording: Recording, robot: Robot, folder: Path) -> Recording:
     """Return the stations of a recording after they were a table, read without any option."""
-    seen = recording.measured
-    assert seen is not None
+    seen = measured_of(recording)
     q = recording.joints.at(seen.t)[0]
     heads = [*robot.joint_names, 'x', 'y', 'z']
     rows = np.concatenate([q, seen.position], axis=1)
@@ -137,10 +120,7 @@ def as_table(recording: Recording, robot: Robot, folder: Path) -> Recording:
         heads += ['qx', 'qy', 'qz', 'qw']
         rows = np.concatenate([rows, quaternion_from_matrix(seen.rotation)], axis=1)
     path = folder / 'table.csv'
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file)
-        writer.writerow(heads)
-        writer.writerows([f'{value:.9f}' for value in row] for row in rows)
+    np.savetxt(path, rows, '%.9f', ',', header=','.join(heads), comments='')
     return read_table(path, robot).recording
 
 
@@ -161,8 +141,6 @@ def result(trials: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
     Return shares named by kind, complaints, what went wrong, and whether the goals are met.
 
     What stands only among the alike of another mistake is counted beside, and not as named.
-
-    trials: those without a ``kind`` are of sound recordings.
     """
     mistakes = [t for t in trials if 'kind' in t]
     sound = [t for t in trials if 'kind' not in t]
@@ -181,27 +159,23 @@ def result(trials: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
 
 
 def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    out: dict[str, Any] = {
-        'trials': len(trials),
-        'named': sum(bool(t['right']) for t in trials),
+
+    def counts(mine: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        return {'trials': len(mine), 'named': sum(bool(t['right']) for t in mine)}
+
+    ways = sorted({t['way'] for t in trials})
+    return {
+        **counts(trials),
         'only_alike': sum(bool(t['only_alike']) for t in trials),
+        **{way: counts([t for t in trials if t['way'] == way]) for way in ways},
     }
-    for way in sorted({str(t['way']) for t in trials}):
-        mine = [t for t in trials if t['way'] == way]
-        out[way] = {'trials': len(mine), 'named': sum(bool(t['right']) for t in mine)}
-    return out
 
 
 def table(content: Mapping[str, Any]) -> str:
     ways = sorted({w for counts in content['named'].values() for w in counts} - NUMBERS)
     rows = [
-        [
-            kind,
-            *(_cell(counts.get(way)) for way in ways),
-            _cell(counts),
-            counts['only_alike'] or '-',
-        ]
-        for kind, counts in content['named'].items()
+        (kind, *(_cell(own.get(way)) for way in ways), _cell(own), own['only_alike'] or '-')
+        for kind, own in content['named'].items()
     ]
     sound = content['sound']
     made = markdown.table(('mistake', *ways, *HEADS), *rows)

@@ -18,7 +18,6 @@ Springs harden, and a moving arm shakes its pedestal as well: both by the richne
 
 from functools import cached_property
 
-import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -159,35 +158,23 @@ class Pedestal:
         self, grid: np.ndarray, motor: CubicSpline, wrench: np.ndarray | None, t: np.ndarray
     ) -> Motion:
         """
-        Return how the base of a moving arm has turned, in its own frame.
+        Return how the base of a moving arm has turned at times t, in its own frame.
 
         grid: evenly spaced, shape (N,) [s]; wrenches are given there.
-        motor: joint positions over time.
-        wrench: shape (N, 6).
-        t: when the lean is wanted, shape (M,) [s].
         """
         coarse = np.arange(0, len(grid), max(1, round(COARSE / float(grid[1] - grid[0]))))
         at = grid[coarse]
-        q, qd, qdd = (_under(motor(at, order)) for order in range(3))
+        # The two hinges under the arm stand still.
+        still = np.zeros((len(at), 2))
+        q, qd, qdd = (np.hstack([still, motor(at, order)]) for order in range(3))
         shaken = -self.parts.richness * self._statics.drive_torque(q, qd, qdd)[:, :2]
         load = None if wrench is None else wrench[coarse]
         return _turned(CubicSpline(at, self._balance(q[:, 2:], load, shaken))(t))
 
     @cached_property
     def _statics(self) -> mujoco_model.Statics:
-        return mujoco_model.Statics(self._model())
-
-    def _model(self) -> mujoco.MjModel:
-        parts, spec = self.parts, mujoco.MjSpec()
-        foot = spec.worldbody.add_body(name='pedestal')
-        mujoco_model.weigh(foot, mujoco_model.MASSLESS, np.zeros(3), 1e-9)
-        for name, axis in (('x', [1, 0, 0]), ('y', [0, 1, 0])):
-            foot.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
-        at = exponentials.home(parts.arm)
-        links = mujoco_model.add_links(spec, parts.robot, parts.arm, parts.load, foot)
-        for i, body in enumerate(links):
-            mujoco_model.add_hinge(body, parts.arm, at, i, f'joint{i}')
-        return spec.compile()
+        own = self.parts
+        return mujoco_model.Statics(mujoco_model.rigid(own.robot, own.arm, own.load, leaning=True))
 
     def _balance(self, q: np.ndarray, wrench: np.ndarray | None, shaken: np.ndarray) -> np.ndarray:
         """Return the lean about x and y, shape (N, 2) [rad]."""
@@ -195,14 +182,8 @@ class Pedestal:
         for _ in range(ROUNDS):
             moment = self._statics.torque(np.hstack([lean, q]), wrench)[:, :2] + shaken
             peak = np.abs(self.compliance * moment).max(axis=0) + 1e-15
-            gain = HARDENING * self.parts.richness
-            lean = self.compliance * moment / (1.0 - 0.5 * gain + gain * (lean / peak) ** 2)
+            lean = self.compliance * moment / self.parts.stiffening(lean, peak)
         return lean
-
-
-def _under(q: np.ndarray) -> np.ndarray:
-    """Return joint values with two hinges under them that stand still, shape (N, 2 + n)."""
-    return np.hstack([np.zeros((len(q), 2)), q])
 
 
 def _turned(lean: np.ndarray) -> Motion:

@@ -57,11 +57,10 @@ def skew(vector: np.ndarray) -> np.ndarray:
 
 def exp_screw(omega: np.ndarray, v: np.ndarray, amount: np.ndarray) -> Motion:
     """
-    Return the motion along a screw.
+    Return the motion along a screw by an amount (...) [rad or m].
 
     omega: unit axis, or zero for a slide, shape (..., 3).
     v: velocity of the origin per unit of the amount [m/rad or -], shape (..., 3).
-    amount: shape (...) [rad or m].
     """
     w = skew(np.asarray(omega, dtype=float))
     ww = w @ w

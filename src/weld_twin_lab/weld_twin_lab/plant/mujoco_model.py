@@ -181,11 +181,16 @@ def add_hinge(
     return body.add_joint(name=name, type=kind, axis=link.rotation.T @ axis, pos=anchor, **options)
 
 
-def rigid(robot: Entry, arm: Arm, load: Load) -> mujoco.MjModel:
-    """Return the arm with one hinge a joint and nothing that gives."""
+def rigid(robot: Entry, arm: Arm, load: Load, *, leaning: bool = False) -> mujoco.MjModel:
+    """Return the arm with one hinge a joint and nothing that gives; two more if its pedestal leans."""
     spec = mujoco.MjSpec()
+    foot = spec.worldbody.add_body(name='pedestal') if leaning else None
+    if foot is not None:
+        weigh(foot, MASSLESS, np.zeros(3), 1e-9)
+        for name, axis in (('x', [1, 0, 0]), ('y', [0, 1, 0])):
+            foot.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
     at = exponentials.home(arm)
-    for i, body in enumerate(add_links(spec, robot, arm, load)):
+    for i, body in enumerate(add_links(spec, robot, arm, load, foot)):
         add_hinge(body, arm, at, i, f'joint{i}')
     return spec.compile()
 

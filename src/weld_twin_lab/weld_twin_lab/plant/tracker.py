@@ -93,11 +93,9 @@ def stamped(t: np.ndarray, jitter: float, rng: np.random.Generator) -> np.ndarra
 
 def gained(causes: Causes, since: np.ndarray, richness: float) -> np.ndarray:
     """
-    Return what the tracker's clock has gained on that of the joints, shape (M,) [s].
+    Return what the tracker's clock has gained on that of the joints since both were set, shape (M,) [s].
 
     Its quartz warms up with the instrument, and it counts whole ticks.
-
-    since: true time since both were set, shape (M,) [s].
     """
     rate = float(causes.total('clock_rate', 'rate'))
     warm = richness * SETTLING * SETTLED * -np.expm1(-since / SETTLED)
@@ -107,11 +105,7 @@ def gained(causes: Causes, since: np.ndarray, richness: float) -> np.ndarray:
 def observe(
     tracker: Tracker, pose: Motion, sigma: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """
-    Return positions (M, 3) [m] and quaternions (M, 4), or None, that the tracker reads of true poses.
-
-    sigma: white noise of each coordinate, the tracker's and any other [m].
-    """
+    """Return positions and quaternions, or None, that the tracker reads of true poses by a noise [m]."""
     position = pose.position + sigma * rng.standard_normal(pose.position.shape)
     if tracker.outlier_share > 0.0:
         off = rng.random(len(position)) < tracker.outlier_share

@@ -49,13 +49,7 @@ STIFFEST = 9e3
 def moving(
     parts: Compliant, t: np.ndarray, motor: CubicSpline, wrench: np.ndarray | None
 ) -> np.ndarray:
-    """
-    Return gaps and springs of the moving arm, shape (N, n) [rad or m].
-
-    t: evenly spaced by `STEP`, shape (N,) [s].
-    motor: motor sides over time, values (n,).
-    wrench: shape (N, 6).
-    """
+    """Return gaps and springs of the moving arm, shape (N, n) [rad or m], at times `STEP` apart."""
     q: np.ndarray = motor(t)
     if parts.richness <= 0.0:
         return parts.at_rest(q, wrench)

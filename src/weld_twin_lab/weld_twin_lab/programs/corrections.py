@@ -44,7 +44,9 @@ from weld_twin_nodes.offline.task_pool import Task
 from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.blind_cell import RATE
-from ..study import Study, engine_digest, head, require_simulator, tabled
+from ..blind.cause_sizes import site
+from ..blind.scoring import in_words
+from ..study import Study, engine_digest, head, require_simulator, shown, tabled
 from .plain import REST, Driven, driven, evenly, tool_pose
 from .sealed_seams import CELLS, MEASURING, SealedSeam, drawn_as, reader_of, sealed_seam
 
@@ -102,7 +104,6 @@ class AskedModel(ProgramModel):
     without: frozenset[str] = MEASURING
 
     def without_memory(self) -> AskedModel:
-        """Return the same plant without play, friction and lag."""
         return replace(self, without=self.without | MEMORY)
 
     def real(self, piece: Piece, motion: JointMotion, *, whole: bool = True) -> Array:
@@ -284,7 +285,6 @@ def _spread(values: Sequence[float]) -> dict[str, float]:
 
 
 def totals(cases: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return what cases add up to by language, and over all."""
     languages = list(dict.fromkeys(case['language'] for case in cases))
     out = {one: counted([c for c in cases if c['language'] == one]) for one in languages}
     return {**out, 'all': counted(cases)}
@@ -320,13 +320,10 @@ def _plain(why: str) -> str:
     return re.sub(r'\d+\.\d+', '...', why.rpartition(': ')[2])
 
 
-def _accuracies(at: Callable[[Any], dict[str, float]]) -> dict[str, Callable[[Any], str]]:
-    """Return the columns of path accuracies [mm], which `at` finds in a row."""
+def _accuracies(*at: Any) -> dict[str, Callable[[Any], str]]:
+    """Return the columns of path accuracies [mm], which stand in a row at some keys."""
     keys = {'AT before, mm': 'before', 'after': 'after', 'true causes': 'true'}
-    return {
-        head: lambda row, key=key: f'{1e3 * at(row)[key]:.3f}'  # type: ignore[misc]
-        for head, key in keys.items()
-    }
+    return {head: shown(*at, key, by='{:.3f}', times=1e3) for head, key in keys.items()}
 
 
 LANGUAGES: dict[str, Callable[[Any], object]] = {
@@ -335,24 +332,22 @@ LANGUAGES: dict[str, Callable[[Any], object]] = {
     'corrected': lambda row: row[1]['corrected'],
     'left': lambda row: row[1]['left'],
     'refused': lambda row: row[1]['refused'],
-    **_accuracies(lambda row: row[1]['at_m']),
-    'after over true, median': lambda row: f'{row[1]["ratio"]["median"]:.2f}',
-    '90 of 100': lambda row: f'{row[1]["ratio"]["p90"]:.2f}',
-    'worst': lambda row: f'{row[1]["ratio"]["worst"]:.2f}',
-    'before over true, median': lambda row: f'{row[1]["ratio_before"]:.2f}',
+    **_accuracies(1, 'at_m'),
+    'after over true, median': shown(1, 'ratio', 'median', by='{:.2f}'),
+    '90 of 100': shown(1, 'ratio', 'p90', by='{:.2f}'),
+    'worst': shown(1, 'ratio', 'worst', by='{:.2f}'),
+    'before over true, median': shown(1, 'ratio_before', by='{:.2f}'),
     'worse than before': lambda row: row[1]['worse'],
 }
 """Columns of the table of languages, each a name and its totals."""
 SEAMS: dict[str, Callable[[Any], object]] = {
     'language': itemgetter('language'),
     'robot': itemgetter('robot'),
-    'causes': lambda case: ', '.join(
-        ' of '.join(filter(None, (c['effect'], c.get('joint')))) for c in case['causes']
-    ),
+    'causes': lambda case: in_words(map(site, case['causes']), ', '),
     'seam': itemgetter('seam'),
     'verdict': itemgetter('status'),
     'outcome': lambda case: case['outcome'] + (', worse than before' if worse(case) else ''),
-    **_accuracies(itemgetter('at_m')),
+    **_accuracies('at_m'),
     'over true': lambda case: f'{ratio(case):.2f}',
 }
 """Columns of the table of seams."""

@@ -98,8 +98,6 @@ MEASURING = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class SealedSeam:
-    """One arm with sealed causes, and a program for it."""
-
     language: str
     case: SealedCase
     """BlindCell, causes, and the free motion."""

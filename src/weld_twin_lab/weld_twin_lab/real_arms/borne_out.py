@@ -75,8 +75,6 @@ Kinds = Mapping[str, Sequence[tuple[Effect, int]]]
 
 @dataclass(frozen=True)
 class Borne:
-    """What unseen data say of one kind."""
-
     median: float
     least: float
     """Growth of the unseen RMS error without it, over the parts."""
@@ -188,7 +186,6 @@ def _usual(robot: Robot, name: str, site: str | None) -> list[Effect]:
 
 
 def _turned(robot: Robot, effects: Sequence[Effect]) -> Iterator[tuple[Effect, int]]:
-    """Yield the components that a fit turns."""
     for effect in effects:
         for k, (parameter, _) in enumerate(effect.components()):
             if parameter.differentiable or not effect.fit.fitted():

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,9 +20,10 @@ from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files import markdown
 
-from ..blind.scoring import bootstrap
+from ..blind.scoring import bootstrap, measured_of, rms
 from ..study import tabled
-from .sources import TUNED_ON, Split, all_splits, halves, servo
+from .rows import halves, size
+from .sources import TUNED_ON, Split, all_splits, servo
 from .unseen import ALIGN, PLAIN, flagged, plain_fit, residual, tried
 
 Entry = dict[str, Any]
@@ -193,11 +194,6 @@ def page(entries: Sequence[Entry], measured: Sequence[Measure]) -> str:
     return '\n'.join(parts)
 
 
-def _name(entry: Entry) -> str:
-    mark = ' *' if entry['robot'] == 'ur5' and entry['kind'] in TUNED_ON else ''
-    return str(entry['name'] + mark)
-
-
 def _mm(region: str, name: str) -> Callable[[Entry], str]:
     """Return what tells the mean error of a model in a region [mm]."""
 
@@ -229,8 +225,10 @@ def _verdict(entry: Entry) -> str:
 
 
 SPLITS: dict[str, Callable[[Entry], object]] = {
-    'split': _name,
-    'stations': lambda entry: entry['stations'],
+    'split': lambda entry: (
+        entry['name'] + ' *' * (entry['robot'] == 'ur5' and entry['kind'] in TUNED_ON)
+    ),
+    'stations': itemgetter('stations'),
     **{name: _mm('inside', name) for name in ('frames', 'geometry', 'gravity', 'product')},
     'over best (95 %)': _ratio('inside', 'over_best'),
     'outside: frames': _mm('outside', 'frames'),
@@ -245,8 +243,6 @@ SPLITS: dict[str, Callable[[Entry], object]] = {
 
 
 PRODUCT, FRAMES = 'product', 'frames'
-HALVES = 60
-"""Stations from which on the two halves of a split are diagnosed as well."""
 AXIS, FITTED = 'servo_axis', 0.6
 """The servo axis, and the share of its recording, from the beginning, that is fitted on."""
 
@@ -263,38 +259,32 @@ def names(data: str) -> list[str]:
 
 
 def judged(data: str, name: str) -> dict[str, Any]:
-    """Return what came of one of `names`, as plain JSON values."""
     return _axis(data) if name == AXIS else judge(_splits(data)[name])
 
 
 def judge(split: Split) -> dict[str, Any]:
-    """Return what came of one split, as plain JSON values."""
     robot = catalog.load(split.robot)
     out: dict[str, Any] = {
         'name': split.name,
         'kind': split.kind,
         'robot': split.robot,
-        'stations': _count(split.train),
+        'stations': size(split.train),
     }
     models: dict[str, Model] = {
         name: plain_fit(split.train, robot, families, ALIGN) for name, families in PLAIN.items()
     }
-    start = perf_counter()
-    diagnosis, error = tried(split.train, robot, align=ALIGN)
-    out['seconds'] = round(perf_counter() - start, 2)
-    out['traceback'] = error
+    diagnosis, spent = tried(split.train, robot, align=ALIGN)
+    out |= spent
     if diagnosis is None:
         return out
     out |= said(diagnosis)
     if diagnosis.status != 'unsound':
         models[PRODUCT] = diagnosis.model
     for region, stations in (('inside', split.inside), ('outside', split.outside)):
-        out[region] = None
-        if stations is not None and _count(stations):
-            out[region] = _region(models, split.train, stations, diagnosis)
-    if _count(split.train) >= HALVES:
-        pair = [tried(half, robot, align=ALIGN) for half in halves(split.train)]
-        out['halves'] = [said(half) if half else {'traceback': text} for half, text in pair]
+        out[region] = stations and _region(models, split.train, stations, diagnosis)
+    if pair := halves(split.train):
+        both = [tried(half, robot, align=ALIGN) for half in pair]
+        out['halves'] = [said(one) if one else {'traceback': x['traceback']} for one, x in both]
     return out
 
 
@@ -324,11 +314,11 @@ def _region(
     """Return the errors of every model on some stations, and how they compare."""
     allowed = {PRODUCT: diagnosis.posterior}
     sizes = {
-        name: _sizes(residual(model, train, stations, allowed.get(name)))
+        name: np.linalg.norm(residual(model, train, stations, allowed.get(name))[:3], axis=0)
         for name, model in models.items()
     }
     out: dict[str, Any] = {
-        'stations': _count(stations),
+        'stations': size(stations),
         'mean_m': {name: float(size.mean()) for name, size in sizes.items()},
         'rms_m': {name: float(np.sqrt((size**2).mean())) for name, size in sizes.items()},
     }
@@ -337,23 +327,23 @@ def _region(
     mine, frames = sizes[PRODUCT], sizes[FRAMES]
     best = min(PLAIN, key=lambda name: out['mean_m'][name])
     flags = np.zeros(mine.size, dtype=bool)
-    if diagnosis.posterior is not None and stations.measured is not None:
-        flags = flagged(diagnosis.posterior, stations, stations.measured.t)
-    out['best'] = best
-    out['over_best'] = paired(mine, sizes[best])
-    out['over_frames'] = paired(mine, frames)
-    out['flagged'] = float(flags.mean())
+    if diagnosis.posterior is not None:
+        flags = flagged(diagnosis.posterior, stations, measured_of(stations).t)
     rest = ~flags
-    out['unflagged_over_frames'] = paired(mine[rest], frames[rest]) if rest.any() else None
-    return out
+    return out | {
+        'best': best,
+        'over_best': paired(mine, sizes[best]),
+        'over_frames': paired(mine, frames),
+        'flagged': float(flags.mean()),
+        'unflagged_over_frames': paired(mine[rest], frames[rest]) if rest.any() else None,
+    }
 
 
 def _axis(data: str) -> dict[str, Any]:
     """Return what is named of the axis, and what is left on the part not fitted on."""
     source = servo(Path(data))
     recording, robot = source.recording, source.robot
-    measured = recording.measured
-    assert measured is not None
+    measured = measured_of(recording)
     cut = int(FITTED * measured.t.size)
     rows = np.arange(measured.t.size)
     train, test = (
@@ -361,17 +351,15 @@ def _axis(data: str) -> dict[str, Any]:
     )
     out: dict[str, Any] = {'name': AXIS, 'kind': AXIS, 'robot': robot.name}
     out['rms_m'] = plain_axis(recording, cut)
-    start = perf_counter()
-    diagnosis, error = tried(train, robot)
-    out |= {'seconds': round(perf_counter() - start, 2), 'traceback': error}
+    diagnosis, spent = tried(train, robot)
+    out |= spent
     if diagnosis is None:
         return out
     out |= said(diagnosis)
     out['found'] = [item.as_dict() for item in diagnosis.effects]
     if diagnosis.status != 'unsound':
-        out['rms_m'][PRODUCT] = _rms(
-            residual(diagnosis.model, train, test, diagnosis.posterior)[2]
-        )
+        off = residual(diagnosis.model, train, test, diagnosis.posterior)
+        out['rms_m'][PRODUCT] = rms(off[2:3].T)
     return out
 
 
@@ -381,21 +369,16 @@ def plain_axis(recording: Recording, cut: int) -> dict[str, float]:
 
     As given; a lag, error proportional to speed; with the sign of the speed; with acceleration.
     """
-    assert recording.measured is not None
-    t, q = recording.joints.t, recording.joints.q[:, 0]
-    error = recording.measured.position[:, 2] - q
-    speed = np.gradient(q, t)
-    columns = [speed, np.sign(speed), np.gradient(speed, t)]
-    out = {'as given': _rms(error[cut:])}
+    t, q = recording.joints.t, recording.joints.q
+    error = measured_of(recording).position[:, 2:] - q
+    speed = np.gradient(q, t, axis=0)
+    columns = [speed, np.sign(speed), np.gradient(speed, t, axis=0)]
+    out = {'as given': rms(error[cut:])}
     for k, name in enumerate(('lag', 'lag and sign', 'lag, sign and acceleration')):
-        design = np.stack([*columns[: k + 1], np.ones(q.size)], axis=1)
+        design = np.hstack([*columns[: k + 1], np.ones(q.shape)])
         best = np.linalg.lstsq(design[:cut], error[:cut], rcond=None)[0]
-        out[name] = _rms(error[cut:] - design[cut:] @ best)
+        out[name] = rms(error[cut:] - design[cut:] @ best)
     return out
-
-
-def _rms(error: Array) -> float:
-    return float(np.sqrt((error**2).mean()))
 
 
 def paired(mine: Array, other: Array) -> dict[str, Any]:
@@ -407,11 +390,3 @@ def paired(mine: Array, other: Array) -> dict[str, Any]:
 
     estimate = bootstrap(np.stack([mine, other], axis=1), ratio)
     return {'ratio': estimate.value, 'low': estimate.low, 'high': estimate.high}
-
-
-def _sizes(parts: Array) -> Array:
-    return np.asarray(np.linalg.norm(parts[:3], axis=0))
-
-
-def _count(recording: Recording) -> int:
-    return 0 if recording.measured is None else int(recording.measured.t.size)

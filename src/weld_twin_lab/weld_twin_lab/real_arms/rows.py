@@ -16,6 +16,7 @@ from weld_twin_core.contacts import Contacts
 from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
+from ..blind.scoring import measured_of
 from . import sources
 from .sources import Rows, Source, alone
 
@@ -87,13 +88,13 @@ def _of_tracked(arm: str) -> list[ArmPlan]:
         for n in COUNTS[1:]
     ]
     out += [
-        ArmPlan(f'{arm} quarter 1', source, partial(_quarter, 0)),
+        ArmPlan(f'{arm} quarter 1', source, partial(_span, 0.0, 0.25)),
         ArmPlan(f'{arm} octant 0', source, partial(_octant, 0)),
     ]
     if arm == 'ur5':
         return [
             *out,
-            ArmPlan('ur5 quarter 4', source, partial(_quarter, 3)),
+            ArmPlan('ur5 quarter 4', source, partial(_span, 0.75, 1.0)),
             ArmPlan('ur5 octant 7', source, partial(_octant, 7)),
         ]
     points = [
@@ -104,11 +105,11 @@ def _of_tracked(arm: str) -> list[ArmPlan]:
 
 
 def row(data: Path, plan: ArmPlan) -> ArmRow:
-    """Return a row of the study, read from its data."""
     source = plan.source(data)
     recording, robot, align = source.recording, source.robot, source.align
     if plan.points_only:
-        recording = _points(recording)
+        seen = measured_of(recording)
+        recording = recording.with_measured(Measurements(seen.t, seen.position))
     fitted, other = plan.make(replace(source, recording=recording))
     if plan.tool_known:
         # As somebody has it who measured the tool apart: by everything that was recorded.
@@ -128,35 +129,22 @@ def halves(recording: Recording) -> tuple[Recording, Recording] | None:
 
 
 def size(recording: Recording) -> int:
-    """Return how many measurements or contacts there are."""
     if recording.contacts is not None:
         return int(recording.joints.t.size)
-    assert recording.measured is not None
-    return int(recording.measured.t.size)
+    return int(measured_of(recording).t.size)
 
 
 def _part(recording: Recording, rows: Rows) -> Recording:
     """Return some rows of a recording, as somebody has it who measured no others."""
-    if recording.contacts is not None:
-        return _touched(recording, recording.contacts, rows)
-    assert recording.measured is not None
-    if recording.joints.static:
+    motion, contacts = recording.joints, recording.contacts
+    if contacts is not None:
+        labels = tuple(contacts.labels[k] for k in rows)
+        part = contacts.artefact.part(tuple(dict.fromkeys(labels)))
+        joints = JointMotion(motion.t[rows], motion.q[rows], static=True)
+        return Recording(recording.name, joints, contacts=Contacts(part, labels))
+    if motion.static:
         return alone(recording, rows)
-    return recording.with_measured(recording.measured.take(rows))
-
-
-def _touched(recording: Recording, contacts: Contacts, rows: Rows) -> Recording:
-    labels = tuple(contacts.labels[k] for k in rows)
-    part = contacts.artefact.part(tuple(dict.fromkeys(labels)))
-    motion = recording.joints
-    joints = JointMotion(motion.t[rows], motion.q[rows], static=True)
-    return Recording(recording.name, joints, contacts=Contacts(part, labels))
-
-
-def _points(recording: Recording) -> Recording:
-    measured = recording.measured
-    assert measured is not None
-    return recording.with_measured(Measurements(measured.t, measured.position))
+    return recording.with_measured(measured_of(recording).take(rows))
 
 
 def _parted(source: Source, chosen: Rows) -> tuple[Rows, Rows]:
@@ -173,22 +161,12 @@ def _span(low: float, high: float, source: Source) -> tuple[Rows, Rows]:
     return _parted(source, np.arange(round(low * count), round(high * count)))
 
 
-def _all(source: Source) -> tuple[Rows, Rows]:
-    return _span(0.0, 1.0, source)
-
-
 def _every_other(first: int, source: Source) -> tuple[Rows, Rows]:
     return _parted(source, np.arange(first, size(source.recording), 2))
 
 
-def _quarter(k: int, source: Source) -> tuple[Rows, Rows]:
-    return _span(k / 4.0, (k + 1) / 4.0, source)
-
-
 def _octant(number: int, source: Source) -> tuple[Rows, Rows]:
-    assert source.recording.measured is not None
-    place = source.recording.measured.position
-    octant = (place > np.median(place, axis=0)) @ np.array([4, 2, 1])
+    octant = sources.octants(measured_of(source.recording).position)
     return _parted(source, np.flatnonzero(octant == number))
 
 
@@ -200,6 +178,7 @@ def _place(k: int, source: Source) -> tuple[Rows, Rows]:
     return _parted(source, np.flatnonzero(place != left_out))
 
 
+_all = partial(_span, 0.0, 1.0)
 _PARTS: dict[str, Make] = {
     'all': _all,
     'odd': partial(_every_other, 1),

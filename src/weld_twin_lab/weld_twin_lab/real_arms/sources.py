@@ -33,6 +33,8 @@ from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Rec
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_msgs_py.tables import read_table
 
+from ..blind.scoring import measured_of
+
 Rows = NDArray[Any]
 """Row numbers."""
 
@@ -64,8 +66,6 @@ All others were run without a change that they themselves had asked for.
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Stations to fit on, and stations to judge on."""
-
     name: str
     kind: str
     robot: str
@@ -89,8 +89,8 @@ def stations(robot: str, directory: Path) -> Recording:
 
 def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
     """Yield twenty splits of one arm's stations, in the order they were measured, from the first on."""
-    assert table.measured is not None
-    rows = np.arange(first, table.measured.t.size)
+    place = measured_of(table).position
+    rows = np.arange(first, len(place))
     rng = np.random.default_rng(13)
     for count in COUNTS:
         chosen = np.sort(rng.choice(rows, count, replace=False))
@@ -100,7 +100,7 @@ def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
             fitted, back = kept_back(chosen)
             yield _split(robot, kind, table, fitted, back, np.setdiff1d(rows, chosen))
     cut = int(FIRST * rows.size)
-    near = among(table.measured.position[rows[:cut]], table.measured.position[rows[cut:]])
+    near = among(place[rows[:cut]], place[rows[cut:]])
     near &= near.sum() >= LEAST  # on a handful nothing can be judged
     far = None if near.all() else rows[cut:][~near]
     yield _split(robot, 'first_fifth', table, rows[:cut], rows[cut:][near], far)
@@ -117,11 +117,14 @@ def _narrow(table: Recording, rows: Rows) -> Iterator[tuple[str, Rows]]:
         yield name, rows[densest(q[:, joints], half)]
     for joint in range(5):
         yield f'still_{joint + 1}', rows[densest(q[:, [joint]], STILL)]
-    assert table.measured is not None
-    position = table.measured.position[rows]
-    octant = (position > np.median(position, axis=0)) @ np.array([4, 2, 1])
+    octant = octants(measured_of(table).position[rows])
     for number in OCTANTS:
         yield f'octant_{number}', rows[octant == number]
+
+
+def octants(place: Array) -> NDArray[Any]:
+    """Return the numbers, 0 to 7, of the octants about their middle that places (M, 3) lie in, (M,)."""
+    return np.asarray((place > np.median(place, axis=0)) @ np.array([4, 2, 1]))
 
 
 def densest(q: Array, half: float) -> NDArray[np.bool_]:
@@ -168,25 +171,19 @@ def _split(
 
 
 def alone(table: Recording, rows: Rows) -> Recording:
-    """
-    Return a table of some rows alone, as somebody has it who measured no others.
-
-    Each row keeps its stamp: which came first is known.
-    """
-    assert table.measured is not None
+    """Return some rows of a table, with their stamps, as somebody has it who measured no others."""
     joints, effort = table.joints, table.effort
     return replace(
         table,
         joints=JointMotion(joints.t[rows], joints.q[rows], None, joints.static),
-        measured=table.measured.take(rows),
+        measured=measured_of(table).take(rows),
         effort=None if effort is None else JointSignal(effort.t[rows], effort.value[rows]),
     )
 
 
 def halves(train: Recording) -> tuple[Recording, Recording]:
     """Return the odd and the even rows of a recording, each alone."""
-    assert train.measured is not None
-    rows = np.arange(train.measured.t.size)
+    rows = np.arange(measured_of(train).t.size)
     return alone(train, rows[1::2]), alone(train, rows[0::2])
 
 
@@ -214,8 +211,6 @@ FIRST_POINT = -0.063
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One arm as it was recorded."""
-
     robot: Robot
     """The nominal model."""
     recording: Recording
@@ -228,8 +223,7 @@ def tracked(data: Path, name: str) -> Source:
     """Return one of the two arms under a laser tracker."""
     robot = name.partition('_')[0]
     recording = stations(robot, data / name)
-    assert recording.measured is not None
-    rows = np.arange(HOME[robot], recording.measured.t.size)
+    rows = np.arange(HOME[robot], measured_of(recording).t.size)
     return Source(catalog.load(robot), replace(alone(recording, rows), name=name))
 
 
@@ -277,19 +271,17 @@ def places_of(data: Path, arm: str) -> tuple[str, ...]:
 
 def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
     """Return the contacts of one of `ARMS` at some places, as one recording."""
-    postures, labels = [], []
-    contacts, ties = [], []
-    for place in places:
-        names = [f'{place}/{socket}' for socket in (0, 1)]
-        for socket, name in enumerate(names):
-            path = data / arm / place / f'hole_{socket}.csv'
-            rows = np.loadtxt(path, delimiter=',', ndmin=2)
-            postures.append(rows)
-            labels += [name] * len(rows)
-            contacts.append(Contact(name))
-        ties.append(Tie((names[0], names[1]), SOCKETS, CALLIPER))
-    q = np.concatenate(postures)
-    touched = Contacts(Artefact(tuple(contacts), tuple(ties)), tuple(labels))
+    postures = {
+        f'{place}/{socket}': np.loadtxt(
+            data / arm / place / f'hole_{socket}.csv', delimiter=',', ndmin=2
+        )
+        for place in places
+        for socket in (0, 1)
+    }
+    ties = tuple(Tie((f'{place}/0', f'{place}/1'), SOCKETS, CALLIPER) for place in places)
+    labels = tuple(name for name, rows in postures.items() for _ in rows)
+    q = np.concatenate(list(postures.values()))
+    touched = Contacts(Artefact(tuple(map(Contact, postures)), ties), labels)
     motion = JointMotion(np.arange(float(len(q))), q, static=True)
     return Recording(arm, motion, contacts=touched)
 

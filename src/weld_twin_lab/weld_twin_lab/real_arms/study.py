@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -39,15 +38,9 @@ def judged(data: str, name: str) -> dict[str, Any]:
     """Return what is reported of one row, and what unseen data say of it, as plain JSON values."""
     plan = next(each for each in plans() if each.name == name)
     one = row(Path(data), plan)
-    start = perf_counter()
     options = {'align': one.align, 'experiment': False}
-    diagnosis, error = tried(one.fitted, one.robot, **options)
-    out: dict[str, Any] = {
-        'name': name,
-        'stations': size(one.fitted),
-        'seconds': round(perf_counter() - start, 1),
-        'traceback': error,
-    }
+    diagnosis, spent = tried(one.fitted, one.robot, **options)
+    out: dict[str, Any] = {'name': name, 'stations': size(one.fitted), **spent}
     if diagnosis is None:
         return out
     out |= _said(diagnosis)
@@ -67,7 +60,7 @@ def judged(data: str, name: str) -> dict[str, Any]:
     pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
         both = [tried(half, one.robot, **options)[0] for half in pair]
-        out['halves'] = [_said(half) if half is not None else None for half in both]
+        out['halves'] = [half and _said(half) for half in both]
     return out
 
 
@@ -166,7 +159,6 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
-    """Return all rows and the figures as a page of Markdown."""
     figures = [f'- {key}: {_figure(value)}' for key, value in summary(entries).items()]
     return '\n'.join(['# Real arms', '', tabled(COLUMNS, entries), *figures]) + '\n'
 
@@ -242,10 +234,7 @@ def _accused(entry: Mapping[str, Any]) -> bool:
 def _said(diagnosis: Diagnosis) -> dict[str, Any]:
     causes = [
         {
-            'probability': c.probability,
-            'sure': c.sure,
-            'share': c.share,
-            'rest': c.rest,
+            **{key: getattr(c, key) for key in ('probability', 'sure', 'share', 'rest')},
             'place': [list(item) for item in c.place[:3]],
             'dependence': [list(item) for item in c.dependence[:3]],
             'names': [[s.effect, s.joint, p] for s, p in c.name],
@@ -253,14 +242,12 @@ def _said(diagnosis: Diagnosis) -> dict[str, Any]:
         for c in diagnosis.causes
     ]
     return {
-        'status': diagnosis.status,
-        'confidence': diagnosis.confidence,
-        'sure': diagnosis.sure,
+        **{key: getattr(diagnosis, key) for key in ('status', 'confidence', 'sure')},
         'families': bool(diagnosis.families),
         'reasons': list(diagnosis.reasons),
         'causes': causes,
-        'gap_m': None if diagnosis.gap is None else diagnosis.gap.rms_m,
-        'shrink': None if diagnosis.shrink is None else diagnosis.shrink.ratio,
+        'gap_m': diagnosis.gap and diagnosis.gap.rms_m,
+        'shrink': diagnosis.shrink and diagnosis.shrink.ratio,
     }
 
 

@@ -12,6 +12,7 @@ import re
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -31,13 +32,13 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.posterior import Posterior
-from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.tables import read_table
 from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
-from ..study import Study
+from ..blind.scoring import in_words
+from ..study import Study, tabled
 from .sources import alone
 
 ALIGN = frozenset({'base', 'tool'})
@@ -53,21 +54,27 @@ ROUNDS = 4
 
 
 def plain_fit(
-    train: Recording, robot: Robot, families: tuple[str, ...], align: frozenset[str]
+    train: Recording,
+    robot: Robot,
+    families: tuple[str, ...],
+    align: frozenset[str],
+    known: tuple[Effect, ...] = (),
 ) -> Model:
     """
-    Return the robot with frames and all members of some families fitted.
+    Return the robot with frames and all members of some families fitted; none for the frames alone.
 
     Least squares with the priors of `weld_twin_core.effects.plausible`, the noise estimated from
     what is left; nothing is chosen and nothing is judged.
-
-    families: one number per joint each; none for the frames alone.
-    align: frames that are fitted: 'base', 'tool'.
     """
     problem = Problem((usable(train),), align)
-    start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
+    start = initial_frames(problem, Model(robot, (robot.T_world_base,), known))
     model = fit(problem, start, problem.unit_scale()).model
-    effects = _members(robot, families)
+    effects: tuple[Effect, ...] = tuple(
+        REGISTRY[family](joint)  # type: ignore[call-arg]
+        for family in families
+        if family != 'joint_compliance' or robot.mass is not None
+        for joint in robot.joint_names
+    )
     if not effects:
         return model
     model = model.with_found(effects)
@@ -77,16 +84,6 @@ def plain_fit(
         scale = robust_scale(problem, problem.residuals(model), freedom=freedom)
         model = fit(problem, model, scale, prior, iterations=6).model
     return model
-
-
-def _members(robot: Robot, families: tuple[str, ...]) -> tuple[Effect, ...]:
-    """Return a member of every family on every joint, at zero."""
-    return tuple(
-        REGISTRY[family](joint)  # type: ignore[call-arg]
-        for family in families
-        if family != 'joint_compliance' or robot.mass is not None
-        for joint in robot.joint_names
-    )
 
 
 def residual(
@@ -119,12 +116,14 @@ def flagged(posterior: Posterior, other: Recording, t: Array) -> NDArray[np.bool
 
 def tried(
     recording: Recording, robot: Robot, **options: Any
-) -> tuple[Diagnosis | None, str | None]:
-    """Return the diagnosis, or the traceback that came instead."""
+) -> tuple[Diagnosis | None, dict[str, Any]]:
+    """Return the diagnosis or None, the seconds it took, and the traceback that came instead."""
+    start, diagnosis, trouble = perf_counter(), None, None
     try:
-        return diagnose([recording], robot, **options), None
+        diagnosis = diagnose([recording], robot, **options)
     except Exception:  # what is counted here is exactly what nobody expected
-        return None, traceback_text()
+        trouble = traceback_text()
+    return diagnosis, {'seconds': round(perf_counter() - start, 2), 'traceback': trouble}
 
 
 _BEFORE = re.compile(r'(?<=File ").*?(?=(?:weld_twin_\w+|site-packages)/)')
@@ -136,14 +135,17 @@ def traceback_text() -> str:
     return _BEFORE.sub('', traceback.format_exc())
 
 
-WAYS = ('frames', 'geometry', 'statics', 'efforts')
-"""Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""
+WAYS = {
+    'frames': 'frames alone, plain fit',
+    'geometry': 'frames and geometry, plain fit',
+    'statics': "diagnosis, springs by the model's statics",
+    'efforts': 'diagnosis, springs by measured efforts (`--use-effort`)',
+}
+"""The models that predict, in words."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """One stretch of time that was not fitted."""
-
     away: dict[str, Array]
     """Distance of measured from predicted, for each of `WAYS`, shape (M,) [m]."""
     names: tuple[str, ...]
@@ -154,11 +156,7 @@ def folds(
     recording: Recording, robot: Robot, count: int, tell: Callable[[str], None]
 ) -> list[Fold]:
     """
-    Return every stretch predicted by models of all the others.
-
-    recording: stations with measured poses and efforts.
-    count: stretches, of equal numbers of stations in the order of time.
-    tell: told of each fold that is done.
+    Return every stretch of stations with measured poses and efforts, predicted by models of all others.
 
     Raises DataError: no efforts, no measurements, or no stations.
     """
@@ -180,8 +178,7 @@ def folds(
             name: np.linalg.norm(residual(model, train, test)[:3], axis=0)
             for name, model in models.items()
         }
-        names = tuple(f'{e.name} of {e.site}' if e.site else e.name for e in by_efforts.found)
-        out.append(Fold(away, names))
+        out.append(Fold(away, tuple(in_words([(e.name, e.site)]) for e in by_efforts.found)))
         tell(f'stretch {len(out)} of {count}: efforts {away["efforts"].mean() * 1e3:.3f} mm')
     return out
 
@@ -190,29 +187,18 @@ def table(name: str, done: Sequence[Fold]) -> str:
     """Return means and maxima of all stretches as a page of Markdown."""
     each = {way: np.concatenate([fold.away[way] for fold in done]) for way in WAYS}
     start = float(each['frames'].mean())
-    words = {
-        'frames': 'frames alone, plain fit',
-        'geometry': 'frames and geometry, plain fit',
-        'statics': "diagnosis, springs by the model's statics",
-        'efforts': 'diagnosis, springs by measured efforts (`--use-effort`)',
+    columns: dict[str, Callable[[str], object]] = {
+        'model': lambda way: WAYS[way],
+        'mean mm': lambda way: f'{each[way].mean() * 1e3:.3f}',
+        'max mm': lambda way: f'{each[way].max() * 1e3:.3f}',
+        'mean over frames alone': lambda way: f'{each[way].mean() / start:.3f}',
     }
     lines = [
         f'# Springs by measured efforts: {len(each["frames"])} {name}',
         '',
         f'Position on stations that were not fitted, {len(done)} stretches of time left out in turn.',
         '',
-        markdown.table(
-            ('model', 'mean mm', 'max mm', 'mean over frames alone'),
-            *(
-                (
-                    words[way],
-                    f'{away.mean() * 1e3:.3f}',
-                    f'{away.max() * 1e3:.3f}',
-                    f'{away.mean() / start:.3f}',
-                )
-                for way, away in each.items()
-            ),
-        ),
+        tabled(columns, WAYS),
         'Found with efforts, stretch by stretch:',
         '',
         *(f'* {", ".join(fold.names) or "nothing"}' for fold in done),

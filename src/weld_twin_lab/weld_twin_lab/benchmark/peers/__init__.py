@@ -21,8 +21,6 @@ PACKAGES = {'pinocchio': 'pin', 'mujoco': 'mujoco'}
 
 @dataclass(frozen=True)
 class Peer:
-    """One arm in one package."""
-
     poses: Callable[[Array], Array]
     """Joint positions (N, n) to poses (N, 4, 4)."""
     screws: Callable[[Array], tuple[Array, Array]]

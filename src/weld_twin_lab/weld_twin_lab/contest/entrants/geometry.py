@@ -76,8 +76,6 @@ ALL = ('a', 'alpha', 'd', 'theta')
 
 @dataclass(frozen=True)
 class Fitted:
-    """What came of a fit."""
-
     names: tuple[tuple[str, int], ...]
     """DH value and row, or frame and -1."""
     values: Array
@@ -135,7 +133,6 @@ def fit(case: ContestCase, free: tuple[str, ...]) -> Fitted:
 
 
 def _moved(robot: Robot, names: tuple[tuple[str, int], ...], values: Array) -> Robot:
-    """Return a robot with corrections to its DH values and frames."""
     change: dict[str, Any] = {name: np.array(getattr(robot, name)) for name in ALL}
     turned = {'base': np.zeros(6), 'tool': np.zeros(6)}
     for (name, row), value in zip(names, values, strict=True):

@@ -3,7 +3,7 @@
 """Who imports whom, read from the source: at the top, inside functions, and for types alone."""
 
 import ast
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -27,12 +27,26 @@ def parsed(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding='utf-8'))
 
 
+def statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield every statement of a source, wherever it stands; no expression holds one."""
+    ahead: list[ast.AST] = [tree]
+    while ahead:
+        node = ahead.pop()
+        yield node
+        parts = ast.iter_child_nodes(node)
+        ahead += [part for part in parts if isinstance(part, HOLDERS)]
+
+
+HOLDERS = (ast.stmt, ast.excepthandler, ast.match_case)
+"""Statements, and the parts of some that hold further ones."""
+
+
 @cache
 def imported_names(module: str, file: Path, *, at_once: bool = False) -> frozenset[str]:
     """Return the full name of all that a file imports, anywhere in it or as it is imported."""
     package = module if file.name == '__init__.py' else module.rpartition('.')[0]
     found: set[str] = set()
-    for node in parsed(file).body if at_once else ast.walk(parsed(file)):
+    for node in parsed(file).body if at_once else statements(parsed(file)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -6,7 +6,7 @@ import ast
 import sys
 from itertools import zip_longest
 
-from import_graph import ROOT, module_files, parsed
+from import_graph import ROOT, module_files, parsed, statements
 
 from weld_twin_core.effects import REGISTRY
 
@@ -29,7 +29,7 @@ def lines(function):
 
 def functions(tree):
     """Yield the functions of a source by name, wherever they stand."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name, lines(node)
 
@@ -137,7 +137,7 @@ def asking():
 
 def imported(file):
     """Return all that a file imports by name, and the last names of modules that it imports whole."""
-    nodes = [n for n in ast.walk(parsed(file)) if isinstance(n, ast.Import | ast.ImportFrom)]
+    nodes = [n for n in statements(parsed(file)) if isinstance(n, ast.Import | ast.ImportFrom)]
     return {alias.name.rpartition('.')[2] for node in nodes for alias in node.names}
 
 

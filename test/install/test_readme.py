@@ -19,8 +19,6 @@ from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.cli import main
 
-pytestmark = pytest.mark.drawn
-
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / 'README.md').read_text()
 

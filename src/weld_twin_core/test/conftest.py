@@ -13,6 +13,6 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE / 'soundness')]
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def ur5():
     return catalog.load('ur5')

@@ -5,7 +5,6 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.motion.paths import Line, default_seam
 from weld_twin_core.sensitivity import (
@@ -20,11 +19,6 @@ from weld_twin_core.sensitivity.claims import CaseName, judge, measure_case
 from weld_twin_core.sensitivity.claims.measures import growth_exponent
 from weld_twin_core.sensitivity.sweep import end_of_linearity, scenario_deviations
 from weld_twin_core.sensitivity.trajectory_advice import Placement
-
-
-@pytest.fixture(scope='module')
-def ur5():
-    return catalog.load('ur5')
 
 
 @pytest.fixture(scope='module')

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from weld_twin_core.arm import catalog
 from weld_twin_core.effects import associative_scan
 from weld_twin_core.effects.backlash import Backlash
 from weld_twin_core.effects.geometry import JointOffset
@@ -30,11 +29,6 @@ from weld_twin_core.sensitivity.evaluate import exact_deviations
 from weld_twin_core.sensitivity.expansion import remembered
 from weld_twin_core.sensitivity.seam_study import outcomes
 from weld_twin_core.sensitivity.trajectory_advice import rms_over_arc
-
-
-@pytest.fixture(scope='module')
-def ur5():
-    return catalog.load('ur5')
 
 
 @pytest.fixture(scope='module')

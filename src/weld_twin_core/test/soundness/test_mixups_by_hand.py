@@ -18,7 +18,7 @@ from weld_twin_core.diagnosis.soundness.evidence import Case, mistake
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _too_large_along
 from weld_twin_core.diagnosis.soundness.mending import Given
-from weld_twin_core.diagnosis.soundness.mixups import _best
+from weld_twin_core.diagnosis.soundness.mixups import _best, _borne
 from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
 from weld_twin_core.diagnosis.soundness.slips import (
     Slip,
@@ -28,12 +28,12 @@ from weld_twin_core.diagnosis.soundness.slips import (
     changes,
     rest_of,
 )
-from weld_twin_core.diagnosis.soundness.snapshot import Snapshot
+from weld_twin_core.diagnosis.soundness.snapshot import Snapshot, of_joints
 from weld_twin_core.diagnosis.soundness.stamps import streams
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions
 from weld_twin_core.effects import JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
-from weld_twin_core.effects.geometry import ToolPose
+from weld_twin_core.effects.geometry import LinkLength, LinkOffset, LinkTwist, ToolPose
 from weld_twin_core.recording import JointMotion
 
 ELBOW_TURNED = [1, 1, -1, 1, 1, 1]
@@ -80,6 +80,21 @@ def test_a_joint_counted_from_the_ground_is_told_where_one_joint_moves_at_a_time
     swept = recorded(robot, motion, rng, (tool,), points=True)
     (told,) = diagnose([rejointed(swept, pendant)], robot, align=('base', 'tool')).unsound
     assert told.kind == 'coupled_axes' and told.at == ('joint_2', 'joint_3')
+
+
+def test_what_nearly_as_many_numbers_as_coordinates_leave_of_noise_says_nothing_of_the_links(
+    ur5, rng
+):
+    """Thirty-three numbers leave half of the noise of twelve stations; ten have no more than thirty."""
+    every = of_joints(ur5, (JointOffset, LinkTwist, LinkLength, LinkOffset))
+    shots = [
+        Snapshot((each,), asked(ur5, each)[1], frozenset({'base', 'tool'}))
+        for count in (12, 10)
+        for each in [recorded(ur5, stations(ur5, rng, count), rng, sigma=2e-3, points=True)]
+    ]
+    few, fewer = ((shot, shot.bent(every, 100.0, 1e-4)) for shot in shots)
+    assert few[0].gap(few[1]) < 2e-3 < 3e-3 < _borne(*few)
+    assert _borne(*fewer) == np.inf and mix_ups._other_links(shots[1]) is None
 
 
 def test_what_is_known_of_joints_stays_with_the_robot_they_are_of(ur5, still):

@@ -306,7 +306,7 @@ def _other_links(shot: Snapshot) -> Finding | None:
     """Return that the lengths of the links are those of another arm; None where they are not."""
     # What an arm can have leaves less than LARGE: more is no noise that would excuse anything.
     own = (JointOffset, LinkTwist)
-    remaining = shot.gap(shot.bent(of_joints(shot.robot, (*own, JointCompliance)), 1.0, LARGE))
+    remaining = _borne(shot, shot.bent(of_joints(shot.robot, (*own, JointCompliance)), 1.0, LARGE))
     if remaining < LARGE:
         return None
     errors = of_joints(shot.robot, (*own, LinkLength, LinkOffset))
@@ -314,7 +314,7 @@ def _other_links(shot: Snapshot) -> Finding | None:
     lengths = np.repeat([e.name in LENGTHS for e in errors], sizes)
     for wider in (WIDER, WIDER**3):  # within a family, and of an arm of another size
         arm = shot.bent(errors, np.where(lengths, wider, 1.0), LARGE)
-        after = shot.gap(arm)
+        after = _borne(shot, arm)
         if HALVED * after < remaining:
             if _moved(shot, arm) <= UNDONE:
                 return None
@@ -323,6 +323,14 @@ def _other_links(shot: Snapshot) -> Finding | None:
             why = f'; with other lengths {falls(remaining, after)}'
             return _foreign(arm.robot, worst, why)
     return None
+
+
+def _borne(shot: Snapshot, model: Model) -> float:
+    """Return the gap [m] that a model leaves, as wide as it is where nothing was fitted to."""
+    fitted = sum(error.fit.coordinates().size for error in model.found)
+    fitted += 6 * len(model.bases) + (6 if shot.turned else 3)
+    free = shot.problem.size - fitted
+    return float(shot.gap(model) * np.sqrt(shot.problem.size / free)) if free > 0 else float('inf')
 
 
 def _moved(shot: Snapshot, arm: Model) -> float:

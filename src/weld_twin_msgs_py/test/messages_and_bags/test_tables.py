@@ -256,3 +256,28 @@ def test_angles_that_fit_several_conventions_need_the_user(tmp_path, ur5):
 def test_options_that_mean_nothing_are_refused(options, words):
     with pytest.raises(DataError, match=re.escape(words)):
         TableOptions(**options)
+
+
+def test_of_several_targets_in_one_column_one_is_read_and_names_of_postures_are_none(
+    tmp_path, ur5
+):
+    q, pose = poses(ur5)
+    beside = pose[:, :3, 3] + pose[:, :3, 0] * 0.08
+    rows = [
+        [*joints, name, *place]
+        for joints, ends in zip(q, zip(pose[:, :3, 3], beside, strict=True), strict=True)
+        for name, place in zip(('T1', 'T2'), ends, strict=True)
+    ]
+    head = [*(f'J{k}' for k in range(1, 7)), 'SMR', 'x', 'y', 'z']
+    file = tmp_path / 'cell.csv'
+    file.write_text('\n'.join(','.join(map(str, row)) for row in [head, *rows]))
+    with pytest.raises(
+        DataError, match='several things were tracked; --marker takes one of T1, T2'
+    ):
+        read_table(file, ur5)
+    read = read_table(file, ur5, TableOptions(marker='T2'))
+    np.testing.assert_allclose(read.recording.measured.position, beside, atol=1e-9)
+    assert any("'T2' of column 'SMR'" in said for said in read.assumptions)
+    own = [[*row[:6], f'P{k}', *row[7:]] for k, row in enumerate(rows[::2])]
+    file.write_text('\n'.join(','.join(map(str, row)) for row in [head, *own]))
+    assert len(read_table(file, ur5).recording.measured.position) == len(q)

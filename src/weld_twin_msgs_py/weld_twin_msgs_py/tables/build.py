@@ -22,6 +22,7 @@ from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Rec
 
 from ..assembly.whole_recording import looks_static
 from .cells import Cells, read_cells
+from .formats import one_of
 from .header import Columns, find_columns
 from .joint_readings import FITS, JointColumns, Units, counted
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
@@ -92,6 +93,20 @@ def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
     )
 
 
+_TARGETS = {
+    'target',
+    'marker',
+    'reflector',
+    'reflektor',
+    'smr',
+    'prism',
+    'ball',
+    'kugel',
+    'ziel',
+    'point',
+    'punkt',
+}
+"""First words of a column that says what was measured."""
 _LISTED = 8
 """Rows that stand out which are listed at most."""
 _FAR = 10.0
@@ -164,6 +179,7 @@ def table_and_units(
     path = cells.path
     try:
         columns = find_columns(cells.header, robot, options)
+        cells = _of_one_target(cells, columns, options.marker, said)
         usable, log = _usable(cells, columns, options, said)
         return _Reading(usable, robot, columns, options, said, log, cells.lines).table()
     except DataError as error:
@@ -469,6 +485,21 @@ def own_epoch(path: Path) -> int:
     taken for a part of the other.
     """
     return 1_000_000_000_000 * (1 + crc32(path.read_bytes()) % 900_000)
+
+
+def _of_one_target(cells: Cells, columns: Columns, marker: str | None, said: list[str]) -> Cells:
+    """Return the rows of one of several targets on the tool that were seen from the same postures."""
+    used = (*columns.joints, *columns.position, *columns.target, *columns.difference)
+    name = cells.by_words({'target': _TARGETS}, used).get('target')
+    if name is None or name not in cells.header:
+        return cells
+    labels, (posture, _) = cells.column(name), cells.alike(columns.joints)
+    seen = np.bincount([at for at, _ in set(zip(posture.tolist(), labels, strict=True))])
+    if np.median(seen) < 2.0:
+        return cells  # each is one posture's own, or there is but one
+    chosen = one_of(sorted(set(labels)), marker)
+    said.append(f'measured is {chosen!r} of column {name!r}')
+    return cells.taken(k for k, label in enumerate(labels) if label == chosen)
 
 
 def _lost(cells: Cells, columns: Columns) -> NDArray[np.bool_]:

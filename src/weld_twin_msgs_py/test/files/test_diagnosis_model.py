@@ -41,6 +41,29 @@ def test_a_verdict_that_is_not_what_the_model_has_is_refused(tmp_path, effects):
     assert str(file) in str(told.value)
 
 
+@pytest.mark.parametrize('moved', [0.0, 1e-3], ids=['one base', 'bases of their own'])
+def test_the_arm_of_a_later_recording_has_what_changed(tmp_path, moved):
+    file, robot = tmp_path / 'diagnosis.json', catalog.load('ur5')
+    first, second = np.eye(4), np.eye(4)
+    second[0, 3] = moved
+    model = {'tool': np.eye(4).tolist(), 'bases': [first.tolist(), second.tolist()], 'found': []}
+    pose = {'xyz': [moved, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0]}
+    changed = [
+        {'recording': 1, **ELBOW, 'value': 5e-4, 'std': 1e-5},
+        {'recording': 1, 'effect': 'tool_pose', 'joint': None, 'value': pose, 'std': pose},
+        {'recording': 1, 'effect': 'base_pose', 'joint': None, 'value': pose, 'std': pose},
+    ]
+    content = {'schema': 'weld_twin/diagnosis/2', 'model': model, 'changed': changed}
+    file.write_text(json.dumps(content))
+    read = read_model(robot, file)
+    assert read.twin(0).effects == ()
+    # A base of its own already stands where that recording had it.
+    names = ['joint_offset', 'tool_pose'] + ['base_pose'] * (moved == 0.0)
+    offset, tool, *_ = effects = read.twin(1).effects
+    assert [effect.name for effect in effects] == names
+    assert offset.offset == 5e-4 and list(tool.xyz) == pose['xyz']
+
+
 @pytest.mark.parametrize(
     ('key', 'value', 'said'),
     [

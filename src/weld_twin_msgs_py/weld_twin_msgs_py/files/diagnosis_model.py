@@ -3,7 +3,7 @@
 """The model of a diagnosis file: fitted frames, effects given, effects found."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,11 @@ import numpy as np
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
-from weld_twin_core.diagnosis.algebra.problem import Alone, Model
+from weld_twin_core.diagnosis.algebra.problem import Alone, Change, Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.dated import in_use, of_the_robot
+from weld_twin_core.effects.registry import REGISTRY
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Counted, Recording
 from weld_twin_core.twin.twin import Twin
@@ -49,7 +50,7 @@ SHAPE: dict[str, Any] = {
         'alone': dict,
         'counted': dict,
     },
-    'changed': [dict],
+    'changed': [{**_SITE, 'recording!': int}],
     'posterior': dict,
     'inputs': [{'use!': str, 'path!': str, 'sha256!': str}],
 }
@@ -134,6 +135,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         )
         alone = _alone(model.get('alone'), robot)
         counted = counted_of(model, robot)
+        changes = _changes(content.get('changed') or (), robot, bases)
         named = _named(content.get('verdict'), model.get('found', []))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"the model of diagnosis '{path}' lacks {error}") from None
@@ -149,6 +151,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         known,
         result,
         mended,
+        changes,
         mends=mends,
         alone=alone,
         named=named,
@@ -162,6 +165,22 @@ def counted_of(model: Mapping[str, Any], robot: Robot) -> Counted | None:
     if entry is None or model.get('kinematics') != fingerprint(robot):
         return None  # the model of another robot is refused by whoever uses it
     return Counted.from_mapping(entry, robot.n)
+
+
+def _changes(
+    entries: Iterable[Mapping[str, Any]], robot: Robot, bases: tuple[Array, ...]
+) -> tuple[Change, ...]:
+    """Return what later recordings have that the first has not; bases of their own hold their own."""
+    own_bases = not all(np.array_equal(base, bases[0]) for base in bases)
+    out = list[Change]()
+    for entry in entries:
+        kind, value = REGISTRY[entry['effect']], entry['value']
+        if own_bases and kind.traits.fitted_with == 'base':
+            continue
+        sizes = value if isinstance(value, dict) else {kind.parameters[0].name: value}
+        site = {key: entry[key] for key in ('effect', 'joint') if entry.get(key) is not None}
+        out.append(Change(entry['recording'], *effects_from_list([{**site, **sizes}], robot)))
+    return tuple(out)
 
 
 def _named(verdict: Any, found: list[Any]) -> tuple[tuple[str, str | None], ...] | None:

@@ -105,7 +105,7 @@ def program_model(
         result, posterior = from_now_on(model.found), read_posterior(robot, path)
         if posterior is not None:
             result, posterior = posterior.of_the_arm().centred(result, setup)
-        effects = (*from_now_on(model.known), *result)
+        effects = (*from_now_on(model.known), *result, *model.changed(setup))
         _refuse_by_effort(effects, path)
         return ProgramModel(placed, effects, posterior, temperature, setup)
     twin = build_twin(robot, path, mended=True)

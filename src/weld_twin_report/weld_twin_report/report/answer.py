@@ -252,7 +252,7 @@ class Answer:
             for item in whole.changed
             for row in parameter_rows(item.effect, item.std, whole.model.robot)
         ]
-        title = f'changed since {whole.recordings[0].name}'
+        title = f'changed since {whole.recordings[0].name}, whose arm the model is'
         return Table(title, ('Recording', 'Changed', 'Parameter', 'By'), rows)
 
     @property

@@ -628,3 +628,17 @@ def test_slips_are_told_of_a_file_by_hand_and_not_of_what_a_diagnosis_leaves_ope
     (tmp_path / 'by_hand.yaml').write_text(2 * spring)
     said = told(tmp_path / 'by_hand.yaml')
     assert 'below zero' in said and 'is there 2 times' in said
+
+
+def test_a_program_for_the_arm_of_a_later_recording_is_corrected_by_what_changed(tmp_path):
+    robot, frame, file = wt.load('ur5'), np.eye(4).tolist(), tmp_path / 'diagnosis.json'
+    slipped = {'effect': 'joint_offset', 'joint': 'elbow_joint'}
+    content = {
+        'schema': 'weld_twin/diagnosis/2',
+        'model': {'tool': frame, 'bases': [frame, frame], 'found': []},
+        'changed': [{**slipped, 'recording': 1, 'value': 5e-4, 'std': 1e-5}],
+    }
+    file.write_text(json.dumps(content))
+    assert correcting.program_model(robot, file).effects == ()
+    (own,) = correcting.program_model(robot, file, setup=1).effects
+    assert own.to_mapping() == {**slipped, 'offset': 5e-4}

@@ -258,6 +258,21 @@ def test_a_kuka_move_counts_from_the_point_before_where_nothing_else_leads_there
     assert (why in last.why) if why else (last.end is not None and not last.why)
 
 
+@pytest.mark.parametrize(
+    ('move', 'moved'),
+    [
+        ('XP1 : {X 10,Y 0,Z 0,A 0,B 0,C 0}', [0.001, 0.012, 0.003]),
+        ('XP1:{X 0,Y 10,Z 5,A 5,B 0,C 0} C_DIS', [-0.009, 0.002, 0.008]),
+    ],
+)
+def test_kuka_places_beside_a_point_go_along_with_it(move, moved):
+    text = f'DEF a()\nDECL E6POS XP1={{X 1,Y 2,Z 3,A 90,B 0,C 0}}\nLIN XP1\nLIN {move}\nEND\n'
+    program = read('krl', (text,))
+    end = program.steps[-1].end
+    assert not end.leads and not program.fixed
+    np.testing.assert_allclose((program.points[end.point].value @ end.after)[:3, 3], moved)
+
+
 BEFORE = {
     'krl': 'LIN XP2 ;',
     'rapid': '        ArcLStart pStart',

@@ -14,7 +14,7 @@ References
    "Status and Turn in LIN motions", industrialmonitordirect.com: linear moves do not use them.
 .. [2] robot-forum.com, thread 40359; posts of the Robots plug-in (visose/Robots, GitHub): EK.
 .. [3] "KUKA LIN_REL vs Geometric Operator: E-Stop Behavior", industrialmonitordirect.com: along the base
-   in force unless #TOOL stands there.
+   in force unless #TOOL stands there; ``XP1 : {X 0, Y 0, Z -100, A 0, B 0, C 0}``.
 
 """
 
@@ -40,6 +40,8 @@ POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', '
 SPEED = 0.1
 """m/s while the program has not said."""
 _MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
+_BESIDE = re.compile(r'(\w+)[ \t]*:[ \t]*\{')
+"""A point and, by the geometric operator, what is added to it along its own axes [3]_."""
 _COUNTED = re.compile(r'[ \t]*(\{[^\r\n]*\})(?:[ \t]*C_\w+)*[ \t]*(#(?:BASE|TOOL))?[ \t]*\Z', re.I)
 """What LIN_REL adds to where the arm stands, and along which axes [3]_."""
 _IN_PLACE = re.compile(
@@ -450,7 +452,7 @@ class KrlReader(Reader):
             self.unknown(kind, result, f'{word} goes to {what!r}, which is not given here')
             return
         ends = [ref for ref in refs if ref is not None]
-        joints = self.program.points[ends[-1]].value.ndim == 1
+        joints = self.program.points[ends[-1].point].value.ndim == 1
         if joints and kind != 'joint':
             self.unknown(kind, result, f'{word} to axis positions is not understood')
             return
@@ -487,7 +489,7 @@ class KrlReader(Reader):
         )
         self.program.stands_beside(point, [])
         tail = self.text[what.end(1) : self.reached].upper()
-        self.program.add(self._step('linear', self.where(result), [point], frames, tail))
+        self.program.add(self._step('linear', self.where(result), [Ref(point)], frames, tail))
         return ''
 
     def _in_full(
@@ -515,16 +517,16 @@ class KrlReader(Reader):
         return tuple(frames)
 
     def _step(
-        self, kind: Kind, where: str, ends: Sequence[int], frames: Frames, tail: str
+        self, kind: Kind, where: str, ends: Sequence[Ref], frames: Frames, tail: str
     ) -> Step:
         speed = self.state.joint_speed if kind == 'joint' else self.state.speed
-        turn = self.turns.get(ends[-1])
+        turn = self.turns.get(ends[-1].point) if ends[-1].leads else None
         own = re.search(rf'\$VEL(?:\.CP)?\s*=\s*(?:SVEL_CP\s*\(\s*)?({NUMBER})', tail)
         return Step(
             kind,
             where,
-            Ref(ends[-1]),
-            Ref(ends[0]) if kind == 'circular' else None,
+            ends[-1],
+            ends[0] if kind == 'circular' else None,
             frames[0],
             frames[1],
             speed if own is None else max(float(own[1].rstrip('.')), LEAST_SPEED),
@@ -540,7 +542,10 @@ class KrlReader(Reader):
         text = self.text
         out = []
         for first, last in self.pieces(start, end):
-            if text.startswith('{', first):
+            beside = _BESIDE.match(text, first, last)
+            if beside is not None:
+                last = closing(self.source, text, beside.end() - 1) + 1
+            elif text.startswith('{', first):
                 last = closing(self.source, text, first) + 1
             else:
                 word = re.match(r'[^\s]+', text[first:last])
@@ -549,7 +554,18 @@ class KrlReader(Reader):
                 out.append((first, last))
         return out
 
-    def _ref(self, start: int, end: int) -> int | None:
+    def _ref(self, start: int, end: int) -> Ref | None:
+        """Return where a target leads; what is added to a point by the geometric operator goes along."""
+        beside = _BESIDE.match(self.text, start, end)
+        if beside is None:
+            point = self._target(start, end)
+            return None if point is None else Ref(point)
+        point, shift = self._target(*beside.span(1)), self._frame_at(0, beside.end() - 1, end)
+        if point is None or shift is None or self.program.points[point].value.ndim == 1:
+            return None
+        return Ref(point).beside(after=shift)
+
+    def _target(self, start: int, end: int) -> int | None:
         text = self.text
         if text.startswith('{', start):
             content = self._aggregate(0, start, end)

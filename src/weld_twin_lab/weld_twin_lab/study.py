@@ -108,7 +108,6 @@ def kept_of_engine(folder: Path) -> Path:
 
 
 def require_simulator() -> None:
-    """Raise DataError where the simulator that cases are made with is not installed."""
     if find_spec('mujoco') is None:
         raise DataError(
             "cases are simulated with MuJoCo; install it with: pip install 'weld-twin[bench]'"
@@ -116,7 +115,6 @@ def require_simulator() -> None:
 
 
 def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) -> str:
-    """Return rows as a table in Markdown, by the head of each column and what it says of a row."""
     cells = [[tell(row) for tell in columns.values()] for row in rows]
     return markdown.table(tuple(columns), *cells)
 

@@ -176,7 +176,6 @@ def _disowned(row: Mapping[str, Any], reported: Sequence[tuple[float, bool, bool
 
 
 def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
-    """Return the measures of an engine by rows of `brief`, each with its interval."""
     cases = [
         scored(row) for row in rows if not row['error'] and row['verdict']['status'] != 'unsound'
     ]
@@ -222,7 +221,6 @@ def _flat(parts: Any) -> list[bool]:
 
 
 def page(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """Return one table of the measures, a column for every engine, by its name."""
     each = {name: scores(rows) for name, rows in tables.items()}
     first = next(iter(each.values()))
     body = [(key, *(str(own[key]) for own in each.values())) for key in first]
@@ -320,7 +318,6 @@ def apart(row: Mapping[str, Any]) -> float:
 
 
 def growing_page(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the measures of rows of `grown`, and every sure cause that fell."""
     good = [row for row in rows if not row['error']]
     every = [step for row in good for step in steps(row)]
     measures = {

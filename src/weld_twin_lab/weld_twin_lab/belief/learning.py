@@ -445,7 +445,6 @@ def _fitted(
     which: NDArray[np.bool_] | slice = slice(None),
     near: Weights | None = None,
 ) -> tuple[Scaled, Weights]:
-    """Return the scaling and the weights of some examples, or of all."""
     scaled = Scaled.of(table.values[which])
     columns = scaled(table.values[which])
     fit = fitted(columns, table.right[which], signs, RIDGE, table.weight[which], near=near)

@@ -185,7 +185,6 @@ def with_oracle(rows: Sequence[dict[str, Any]], runner: Runner) -> list[dict[str
 
 
 def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[str, Any]:
-    """Return the content of the file of weights that rows of `judged.kept` teach."""
     own = [row for row in rows if row.get('examples')]
     return learning.learned(examples_of(own), {**_drawn(own), 'mix': MIX}, risk)
 
@@ -229,7 +228,6 @@ def judged(
 
 
 def worth(examples: Sequence[Example]) -> dict[str, Any]:
-    """Return how far what is told of some statements can be trusted."""
     reported = np.array([e.reported for e in examples])
     right = np.array([e.right for e in examples], bool)
     sure = [e.sure for e in examples]
@@ -275,7 +273,6 @@ def page(result: Mapping[str, Any]) -> str:
 
 
 def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
-    """Return what was learned from, and from where a statement is told as sure."""
     by = (
         f'judged on {tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was '
         'learned from'

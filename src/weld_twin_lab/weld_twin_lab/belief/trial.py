@@ -262,7 +262,6 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
 def row_of(
     name: str, case: SealedCase, *, held_out: bool = True, small: Sequence[Cause] = ()
 ) -> dict[str, Any]:
-    """Return the row of a case, with small errors everywhere besides its causes or without."""
     row: dict[str, Any] = {
         'name': name,
         'engine': engine_digest()[:16],
@@ -311,7 +310,6 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
 def diagnosed(
     case: SealedCase, recordings: Sequence[Recording], *, held_out: bool = False
 ) -> Diagnosis:
-    """Return the diagnosis of recordings of a case, its held-out recording given or not."""
     cell = case.cell
     return diagnose(
         recordings,

@@ -221,7 +221,6 @@ def lines(outcome: Outcome) -> Iterator[str]:
 
 
 def page(outcomes: list[Outcome]) -> str:
-    """Return a table in Markdown: own time, and times as fast as the reference and the others."""
     rows = [('workload', 'time', 'times as fast as', 'and as the others')]
     for outcome in outcomes:
         load = outcome.workload
@@ -247,7 +246,6 @@ def brief(outcomes: list[Outcome]) -> str:
 
 
 def times(outcome: Outcome, name: str) -> str:
-    """Return the median ratio and its range over the rounds."""
     ratio = outcome.ratio(name)
     if ratio is None:
         return '-'

@@ -204,7 +204,6 @@ def _run(words: Sequence[str], place: Path, written: Path) -> Cost | None:
 
 
 def page(entries: Sequence[Entry]) -> str:
-    """Return the table with what a reader must know of it, in Markdown."""
     return (
         '# What people wait for\n\n'
         'Whole commands, started cold, by `weld-twin lab waits`. Ratios are medians of pairs of '
@@ -277,7 +276,6 @@ def run(study: Study) -> None:
 
 
 def _kept(file: Path) -> list[Entry]:
-    """Return the rows that were measured before; none where there are none."""
     if not file.exists():
         return []
     try:

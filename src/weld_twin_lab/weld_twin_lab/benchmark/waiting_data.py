@@ -45,8 +45,6 @@ WORN = 4
 
 
 def fill(database: Database, cells: int, diagnoses: int, seed: int = 1) -> None:
-    """Fill an empty database with so many cells, and so many diagnoses of each."""
-
     def work(connection: Connection) -> None:
         for number in range(cells):
             for entry in drawn(number, diagnoses, seed):
@@ -139,7 +137,6 @@ def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -
 
 
 def stations(count: int) -> Recording:
-    """Return so many stations of a UR10 with errors of its geometry and of its gears."""
     robot, rng = load('ur10'), np.random.default_rng(11)
     t = np.arange(float(count))
     q = rng.uniform(-2.5, 2.5, (count, robot.n))

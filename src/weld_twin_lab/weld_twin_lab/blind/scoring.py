@@ -143,13 +143,11 @@ def bootstrap(
 
 
 def brier(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
-    """Return the Brier score, the mean squared error of the confidence."""
     squares = (np.asarray(confidence, dtype=float) - np.asarray(right, dtype=float)) ** 2
     return bootstrap(squares, np.mean)
 
 
 def calibration_error(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
-    """Return the expected calibration error over ten bins of equal width."""
     pairs = np.array([confidence, right], dtype=float).T
     return bootstrap(pairs, _calibration_error)
 
@@ -199,7 +197,6 @@ class Measure:
 
 
 def measure_table(measures: Sequence[Mapping[str, Any]]) -> str:
-    """Return measures, as `Measure.as_dict` gives them, beside their goals in Markdown."""
     return markdown.table(HEADS, *map(_row, measures))
 
 
@@ -284,7 +281,6 @@ class Judged:
 
 
 def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judged:
-    """Return what a diagnosis, or its failure to come about, was worth."""
     verdict = diagnosis['verdict'] if diagnosis else {}
     status = str(verdict.get('status', 'error'))
     groups = [
@@ -416,7 +412,6 @@ def score(cases: Path, truths: Path, results: Path, *, seal_given: str = '') -> 
 
 
 def measures(cases: Sequence[Judged]) -> list[Measure]:
-    """Return how often which kind of case was answered rightly, and what confidence is worth."""
     answered = [case for case in cases if case.status != 'error']
     error = calibration_error([c.confidence for c in answered], [c.right for c in answered])
     return [
@@ -437,7 +432,6 @@ def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def page(score: Mapping[str, Any]) -> str:
-    """Return measures, cases that were missed, and what a diagnosis costs."""
     made, costs, count = score['made'], score['costs'], score['count']
     seen = 'could be read' if made['truths_readable'] else 'could not be read'
     missed = [case for case in score['cases'] if not case['right']]

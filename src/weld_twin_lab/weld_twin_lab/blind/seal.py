@@ -57,7 +57,6 @@ PRIVATE_DIRECTORY, PRIVATE_FILE = 0o700, 0o600
 
 
 def digest(path: Path) -> str:
-    """Return the SHA-256 over the names and contents of a directory."""
     return hashed('case', path).sha256
 
 

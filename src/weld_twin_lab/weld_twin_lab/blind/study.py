@@ -44,7 +44,6 @@ def whole(study: Study) -> None:
 
 
 def _made(study: Study, cases: Path, truths: Path) -> None:
-    """Make the cases that the options ask for, and print their seal."""
     require_simulator()
     from .making import make  # not beside a diagnosis
 

@@ -34,7 +34,6 @@ SCHEMA = 'weld_twin/campaign/1'
 
 
 def run(study: Study) -> bool:
-    """Run the campaign, write its result, and say whether it passed."""
     args, name = study.args, str(study.args.job)
     refuse_foreign(args.out, name)
     module = import_module(f'{__name__}.{name}')

@@ -318,7 +318,6 @@ def _cell() -> Iterator[tuple[Cell, Path]]:
 
 
 def other_arm(seed: int) -> str:
-    """Return what a compensator says that is given the model of another arm."""
     names = ('ur5', 'ur10e')
     robot, causes, rng = cell_of(names[1], seed)
     text = learned(robot, causes, rng).text
@@ -434,7 +433,6 @@ def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
 
 
 def _before(args: Given) -> Known:
-    """Return the goals and changes of the file, none where there is no file yet."""
     file = Path(args.out)
     if not args.go_on or not file.exists():
         return Known([], [], [])
@@ -556,7 +554,6 @@ def table(result: dict[str, Any]) -> str:
 
 
 def _spread(result: dict[str, Any]) -> str:
-    """Return how differently bounds held in the arms of both tables."""
     counts = result['spread']
     if not counts['arms']:
         return ''

@@ -489,7 +489,6 @@ def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
 
 
 def _on_bench(faults: Sequence[Any], folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return what each node of one cell did under each fault, and whether its bag is whole."""
     rows: list[dict[str, Any]] = []
     if not faults:
         return {'faults': rows, 'parameters': [], 'bag': {'passed': True, 'messages': 0}}
@@ -555,7 +554,6 @@ COLUMNS = {
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return what each node told under each fault, and what else there is to say."""
     passed = {True: 'yes', False: 'no'}
     rows = [
         (

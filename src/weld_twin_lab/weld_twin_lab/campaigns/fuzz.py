@@ -458,7 +458,6 @@ def robot_of(name: str) -> Robot:
 
 
 def recording_of(draw: Draw) -> tuple[Recording, Robot]:
-    """Return the recording of a draw, and the robot it is diagnosed as."""
     robot, rng = robot_of(draw.robot), np.random.default_rng(draw.seed)
     q = _positions(draw, robot, rng)
     t = np.arange(float(draw.count)) * (1.0 if draw.stations else 0.01)

@@ -272,7 +272,6 @@ processor time that the relay has no like of, so that only the latency counts th
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return latency and CPU time of each contender at each rate, and the ratios."""
     joints, pose = JOINT_STATES.message_class(), TWIN_POSE.message_class()
     contenders = (
         Contender('relay', RELAY, joints, ()),
@@ -379,7 +378,6 @@ def table(result: dict[str, Any]) -> str:
 
 
 def pose_table(poses: dict[str, Any]) -> str:
-    """Return a row for the relay of poses, one for the compensator, and one of their ratios."""
     head = (f'{poses["rate_hz"]:g} poses a second', 'p50', 'p99', 'CPU')
     rows = [
         (name, *(f'{own[key] / 1e3:.2f} ms' for key in COMPARED[:2]), f'{own["cpu_us"]:.0f} us')

@@ -210,7 +210,6 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
 
 
 def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
-    """Make a library of the structures, one of each type support, and the Python module."""
     include = folder / 'include' / package
     include.mkdir(parents=True)
     for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / JOINT, made):

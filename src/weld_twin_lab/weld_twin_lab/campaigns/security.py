@@ -149,7 +149,6 @@ def _stopped(cell: Mapping[str, subprocess.Popen[bytes]]) -> list[int]:
 
 
 def _recorded(bag: Path) -> tuple[list[int], dict[str, int]]:
-    """Return the joint states in a bag by party, and the messages by topic."""
     marks: Counter[int] = Counter()
     with BagReader(bag) as reader:
         topics = Counter(topic for topic, *_ in reader.raw(list(reader.topics)))
@@ -162,7 +161,6 @@ WAYS = ('open', 'enforced')
 
 
 def run(args: Given, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Return what strangers heard and what was recorded of them, without keys and with."""
     with TemporaryDirectory() as folder:
         result = _tried(args, Path(folder), tell)
     return {'passed': verdict(result), **result}

@@ -43,7 +43,6 @@ def rss_bytes(pid: int) -> int:
 
 
 def children(pid: int) -> list[int]:
-    """Return the processes a process has started and that still run."""
     out: list[int] = []
     for task in (PROC / str(pid) / 'task').iterdir():
         with suppress(OSError):
@@ -149,7 +148,6 @@ class Soak:
         return f'{t / 60.0:5.1f} min, MiB {now}'
 
     def usage(self, warm: float) -> dict[str, dict[str, float]]:
-        """Return CPU share, memory and its slope of each node, and of the diagnosis's workers."""
         out = {}
         for name, samples in self.samples.items():
             t, rss, cpu = np.array(samples, dtype=np.float64).T
@@ -172,7 +170,6 @@ class Soak:
         return out
 
     def health(self) -> dict[str, Any]:
-        """Return received, refused and missing of each input, and what was told but ok."""
         out: dict[str, Any] = {}
         for name, values in sorted(self._listener.values.items()):
             said = [text for level, text in self._reported.get(name, []) if level != 'ok']

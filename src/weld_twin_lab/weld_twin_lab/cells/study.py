@@ -199,7 +199,6 @@ Truly = Callable[[list[Cause]], Motion]
 def _drawn(
     kind: str, seed: int, rng: np.random.Generator, swing: float
 ) -> tuple[Robot, Array, Truly]:
-    """Return a cell, its postures, and where its torch really is there."""
     data = cell(kind, seed)
     robot = Robot.from_mapping(data)
     q = postures(robot, STATIONS, rng, swing)
@@ -208,7 +207,6 @@ def _drawn(
 
 
 def _told(robot: Robot, recording: Recording, cause: Cause) -> CaseResult:
-    """Return what is told of a recording with both frames open, beside the truth."""
     return opened(diagnose(recording, robot, align=ALIGN, experiment=False), site(cause))
 
 
@@ -366,7 +364,6 @@ AS_TRACKED = 0.8
 def page(
     cases: Sequence[CaseResult], pixels: Sequence[CaseResult], real: Sequence[CaseResult]
 ) -> str:
-    """Return the page of sealed cells, of cases beside a camera, and of a real arm's pixels."""
     lines = ['# Whole cells, and cameras', '']
     if cases:
         kinds = dict.fromkeys(case['kind'] for case in cases)

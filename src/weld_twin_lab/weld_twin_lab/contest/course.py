@@ -405,7 +405,6 @@ def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) 
 
 
 def arm_table(by_method: Mapping[str, Mapping[str, float]], names: list[str]) -> str:
-    """Return mean errors in millimetres, a row for each method, the least bold, in Markdown."""
     best = {
         name: min((errors[name] for errors in by_method.values() if name in errors), default=0.0)
         for name in names

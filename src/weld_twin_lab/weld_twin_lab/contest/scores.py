@@ -164,7 +164,6 @@ def _sure_wrong(answer: ContestAnswer, case: Sealed) -> bool:
 
 
 def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nominal: str) -> str:
-    """Return the table of all methods in Markdown, and what is said of those without an answer."""
     rows = [(method, summary(said, cases)) for method, said in runs.items()]
     return tabled(COLUMNS, rows) + f'\n{nominal}\n'
 
@@ -231,7 +230,6 @@ def run(study: Study) -> None:
 
 
 def _on_sealed(study: Study, methods: dict[str, list[str]]) -> tuple[dict[str, Any], str]:
-    """Return what all methods are worth on the sealed cases, and the table."""
     args, out = study.args, study.out
     cases, truths = Path(args.cases), Path(args.truths)
     names = course.opened(cases, truths, out / 'cases')[: args.first or None]

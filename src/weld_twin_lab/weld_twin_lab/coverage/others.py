@@ -155,7 +155,6 @@ def made(seed: int) -> Sealed:
 
 
 def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], Array]:
-    """Return nominal postures at every socket, their labels, and where each socket is."""
     q, labels, places = [], [], []
     for k, middle in enumerate(SOCKETS):
         for socket in (0, 1):

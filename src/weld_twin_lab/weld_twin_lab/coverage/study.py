@@ -173,7 +173,6 @@ the tool really is; [how it was done](../../predictions.md#does-it-hold).
 
 
 def page(entries: Sequence[Entry]) -> str:
-    """Return the summary, what became of other promises, and the table of every recording."""
     plans = [entry for entry in entries if 'promised_within' in entry]
     rest = [entry for entry in entries if 'source' in entry]
     rows = [
@@ -190,7 +189,6 @@ def page(entries: Sequence[Entry]) -> str:
 
 
 def of_plans(plans: Sequence[Entry]) -> dict[str, float]:
-    """Return how plans of a first measurement compare with what came of them."""
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in plans]
     warned = [e['warned_sigma_m'] / e['promised_sigma_m'] for e in plans]
     beyond = [e['warned_elsewhere_m'] / e['promised_elsewhere_m'] for e in plans]
@@ -215,7 +213,6 @@ def promises(entries: Sequence[Entry]) -> dict[str, list[dict[str, Any]]]:
 
 
 def promise_table(entries: Sequence[Entry]) -> str:
-    """Return how often the intervals of `promises` hold, and how wide they are."""
     rows = []
     for kind, told in promises(entries).items():
         ends = np.array([one['ci90'] for one in told])
@@ -229,7 +226,6 @@ def promise_table(entries: Sequence[Entry]) -> str:
 
 
 def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """Return the mean share held over recordings, by source, group and region."""
     kinds = dict.fromkeys((e['source'], e['group'], r) for e in entries for r in REGIONS)
     parts = {
         kind: [

@@ -182,7 +182,6 @@ SIZES = {
 
 
 def cause(name: str, value: float) -> dict[str, object]:
-    """Return the flaw that a coordinate stands for, as the plant takes it."""
     if name.startswith('tool'):
         axis = int(name[-1]) if name[-1].isdigit() else 'xyz'.index(name[-1])
         xyz = [value if k == axis else 0.0 for k in range(3)]

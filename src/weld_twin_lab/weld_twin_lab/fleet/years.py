@@ -462,7 +462,6 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
 
 
 def _common(entries: Sequence[Entry]) -> list[Entry]:
-    """Return entries with only the coordinates that all have, in the same order."""
     names = [n for n in entries[0].names if all(n in each.names for each in entries)]
 
     def own(each: Entry) -> Entry:

@@ -54,7 +54,6 @@ def mistake(seed: int, kind: str, way: str, number: int) -> dict[str, Any]:
 
 
 def judged(kind: str, verdict: Mapping[str, Any]) -> dict[str, bool]:
-    """Return whether a mistake is named, and whether it only stands among those alike."""
     right = kind in (*verdict['kinds'], *verdict['dated'])
     return {'right': right, 'only_alike': not right and kind in verdict['alike']}
 
@@ -82,7 +81,6 @@ def complaint(seed: int, number: int) -> dict[str, Any]:
 
 
 def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str) -> dict[str, Any]:
-    """Return what the gate says of a recording after it was a bag or a table."""
     begin = time.perf_counter()
     with TemporaryDirectory() as folder:
         try:

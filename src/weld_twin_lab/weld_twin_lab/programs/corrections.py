@@ -168,7 +168,6 @@ def seam_driven(seam: SealedSeam, text: str) -> Driven:
 
 
 def _accuracy(seam: SealedSeam, text: str, wanted: Driven) -> Any:
-    """Return how far the plant's tool is from the seam as the program means it."""
     base = np.array(seam.robot.T_world_base)
     real = seam.ran(*evenly(seam_driven(seam, text), RATE)).position
     return path_accuracy(real, wanted.tool @ base[:3, :3].T + base[:3, 3])
@@ -216,7 +215,6 @@ def _by_diagnosis(
 
 
 def _promised(made: CorrectedProgram) -> dict[str, Any]:
-    """Return what a correction promises of before and after, as plain JSON values."""
     return {
         name: {'ci90_m': [accuracy.low, accuracy.high], 'sure_within_m': accuracy.sure_within}
         for name, accuracy in zip(('before', 'after'), made.accuracy, strict=True)
@@ -255,7 +253,6 @@ def ratio(entry: dict[str, Any], what: str = 'after') -> float:
 
 
 def counted(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return what cases of `corrected_seam` add up to; those that could not be drawn are told apart."""
     drawn = [case for case in cases if 'undrawn' not in case]
     outcomes = Counter(case['outcome'] for case in drawn)
     out: dict[str, Any] = {'cases': len(drawn), 'undrawn': len(cases) - len(drawn)}

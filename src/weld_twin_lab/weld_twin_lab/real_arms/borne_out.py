@@ -126,7 +126,6 @@ def borne_out(
 
 
 def thinned(recording: Recording) -> Recording:
-    """Return a recording with no more measurements than are looked at."""
     if recording.measured is None or recording.measured.t.size <= MOST:
         return recording
     count = recording.measured.t.size

@@ -45,7 +45,6 @@ class Measure(NamedTuple):
 
 
 def measures(entries: Sequence[Entry]) -> list[Measure]:
-    """Return every measure over the splits, the servo axis left out."""
     splits = [e for e in entries if e['kind'] != 'servo_axis']
     return [
         _never_much_worse(splits),
@@ -289,7 +288,6 @@ def judge(split: Split) -> dict[str, Any]:
 
 
 def said(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return status, confidence, what is named, and whether a machine can have it."""
     named = sorted({item.effect.name for item in diagnosis.effects})
     families = sorted(family.effect for family in diagnosis.families if family.named)
     return {
@@ -311,7 +309,6 @@ def said(diagnosis: Diagnosis) -> dict[str, Any]:
 def _region(
     models: dict[str, Model], train: Recording, stations: Recording, diagnosis: Diagnosis
 ) -> dict[str, Any]:
-    """Return the errors of every model on some stations, and how they compare."""
     allowed = {PRODUCT: diagnosis.posterior}
     sizes = {
         name: np.linalg.norm(residual(model, train, stations, allowed.get(name))[:3], axis=0)

@@ -182,7 +182,6 @@ def alone(table: Recording, rows: Rows) -> Recording:
 
 
 def halves(train: Recording) -> tuple[Recording, Recording]:
-    """Return the odd and the even rows of a recording, each alone."""
     rows = np.arange(measured_of(train).t.size)
     return alone(train, rows[1::2]), alone(train, rows[0::2])
 
@@ -270,7 +269,6 @@ def places_of(data: Path, arm: str) -> tuple[str, ...]:
 
 
 def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
-    """Return the contacts of one of `ARMS` at some places, as one recording."""
     postures = {
         f'{place}/{socket}': np.loadtxt(
             data / arm / place / f'hole_{socket}.csv', delimiter=',', ndmin=2

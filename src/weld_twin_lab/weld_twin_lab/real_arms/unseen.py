@@ -184,7 +184,6 @@ def folds(
 
 
 def table(name: str, done: Sequence[Fold]) -> str:
-    """Return means and maxima of all stretches as a page of Markdown."""
     each = {way: np.concatenate([fold.away[way] for fold in done]) for way in WAYS}
     start = float(each['frames'].mean())
     columns: dict[str, Callable[[str], object]] = {

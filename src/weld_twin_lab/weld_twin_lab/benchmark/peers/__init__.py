@@ -33,7 +33,6 @@ class Peer:
 
 
 def find_peers(robot: Robot) -> tuple[dict[str, Peer], dict[str, str]]:
-    """Return the peers that are installed, and why the others are left out."""
     peers, missing = {}, {}
     for name, package in PACKAGES.items():
         try:

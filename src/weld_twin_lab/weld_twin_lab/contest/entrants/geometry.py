@@ -106,7 +106,6 @@ def answer_with(case: ContestCase, free: tuple[str, ...]) -> ContestAnswer:
 
 
 def fit(case: ContestCase, free: tuple[str, ...]) -> Fitted:
-    """Return the DH values and frames that fit the measured positions best."""
     measured = case.measured
     rows = np.unique(np.linspace(0, measured.t.size - 1, MOST).astype(int))
     q, _ = case.train.joints.at(measured.t[rows])

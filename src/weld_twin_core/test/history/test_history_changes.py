@@ -160,6 +160,78 @@ def test_an_effect_that_is_not_named_is_taken_to_be_small():
     assert series.weighted[0, k] == 0.0
 
 
+def rows_of_a_program(seed):
+    """Return the rows that a program of postures shows of an arm."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(60, COUNT)) @ np.diag(rng.uniform(0.3, 3.0, COUNT))
+
+
+def year_of_programs(seed, repeated, programs, drift=None):
+    """Return weekly posteriors, program after program; a share of the noise is each one's own."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for program in range(programs):
+        rows = rows_of_a_program((seed, program))
+        own = np.sqrt(repeated) * rng.normal(size=len(rows))
+        covariance = np.linalg.inv(rows.T @ rows + np.eye(COUNT))
+        for week in range(52 // programs * program, 52 // programs * (program + 1)):
+            moved = np.zeros(COUNT) if drift is None else drift(week)
+            noise = own + np.sqrt(1.0 - repeated) * rng.normal(size=len(rows))
+            value = covariance @ (rows.T @ (rows @ moved + noise))
+            out.append(Observation(7.0 * week, NAMES, value, covariance, np.ones(COUNT)))
+    return out
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_another_program_is_no_step_of_the_arm(seed):
+    """Play that nobody named errs alike at the same postures, each week, and otherwise at others."""
+    other = 7.0 * 26
+    found = changes(year_of_programs(seed, 0.8, 2))
+    assert not [each for each in found if each.between[0] <= other <= each.between[1]]
+
+
+def test_what_comes_back_at_the_same_postures_hides_no_step_between_them():
+    error = np.sqrt(np.diag(year_of_programs(0, 0.8, 1)[0].covariance))
+    size = 2.0 * float(error[3])
+    (found,) = changes(year_of_programs(0, 0.8, 1, only(3, size, 40)))
+    assert (found.name, found.kind) == (NAMES[3], 'step')
+    assert abs(found.size - size) < 3.0 * found.std < error[3]
+    (plain,) = changes(year_of_programs(0, 0.0, 1, only(3, size, 40)))
+    assert found.std == pytest.approx(np.sqrt(0.2) * plain.std, rel=0.2)
+
+
+def framed(observations):
+    """Return observations whose first six coordinates are those of the tool."""
+    axes = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
+    names = (*(f'tool.{axis}' for axis in axes), *NAMES[6:])
+    return [replace(each, names=names) for each in observations]
+
+
+def test_a_knock_is_one_change_of_one_frame():
+    knock = np.array([0.9, -0.7, 0.8, 0.0, 0.0, 0.0, *np.zeros(COUNT - 6)])
+    (found,) = changes(framed(year(1, lambda week: knock * (week >= 20), weeks=30)))
+    assert (found.kind, len(found.together)) == ('step', 6)
+    for each, true in zip(found.together, knock, strict=False):
+        assert abs(each.size - true) < 3.0 * each.std
+    lead = max(found.together, key=lambda each: abs(each.size) / each.std)
+    assert (found.name, found.size, found.std) == lead
+    (alone,) = changes(framed(year(1, only(1, 0.9, 20), weeks=30)))
+    assert (alone.name, alone.together, alone.alike) == ('tool.y', (), ())
+
+
+def test_of_what_no_motion_shows_nothing_is_told():
+    """Two coordinates that move nothing have values of rounding alone."""
+    rng = np.random.default_rng(4)
+    blind = []
+    for each in year(5, weeks=30):
+        value, covariance = each.value.copy(), each.covariance.copy()
+        value[:2] = 1e-16 * rng.normal(size=2)
+        covariance[:2] = covariance[:, :2] = 0.0
+        covariance[:2, :2] = np.eye(2)
+        blind.append(replace(each, value=value, covariance=covariance))
+    assert changes(blind) == ()
+
+
 def test_diagnoses_of_one_instant_and_none_are_refused():
     with pytest.raises(DataError, match='of the same instant'):
         changes([year(0, weeks=1)[0]] * 2)

@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed on one arm from diagnosis to diagnosis, and where it leads."""
 
-from .changes import Change, Observation, Outlook, changes, outlook, reaches
+from .changes import ALL, Change, Moved, Observation, Outlook, changes, outlook, reaches
 
-__all__ = ['Change', 'Observation', 'Outlook', 'changes', 'outlook', 'reaches']
+__all__ = ['ALL', 'Change', 'Moved', 'Observation', 'Outlook', 'changes', 'outlook', 'reaches']

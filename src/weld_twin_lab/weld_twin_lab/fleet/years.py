@@ -133,7 +133,7 @@ def _widened(observation: Observation, names: Sequence[str]) -> Array:
 
 def _same(event: Event, change: Change, joints: Sequence[str]) -> bool:
     """Tell whether a change told may be an event: its coordinate among those told, its date near."""
-    names = {change.name, *change.alike}
+    names = {change.name, *change.alike, *(each.name for each in change.together)}
     if event.name not in names and not any(
         {_site(event.name, joints), _site(name, joints)} == {TOOL} for name in names
     ):

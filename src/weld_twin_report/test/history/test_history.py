@@ -15,11 +15,12 @@ from command_line import done, refused
 
 import weld_twin_core as wt
 from weld_twin_core.errors import DataError
+from weld_twin_core.history import Change, Moved
 from weld_twin_core.twin.directions import GIVE
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_report.history import Database, entry_of
 from weld_twin_report.history.entry import Entry
-from weld_twin_report.history.words import changed, observations
+from weld_twin_report.history.words import changed, observations, sentence
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -105,6 +106,18 @@ def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
     entries = [entry(week, (zero,), (0.0,)) for week in range(3)]
     entries += [entry(week, (zero, give), (0.0, 5e-5)) for week in range(3, 6)]
     assert changed(entries, observations(entries)) == ()
+
+
+def test_a_knocked_tool_is_told_along_each_axis_in_its_unit():
+    moved = (Moved('tool_pose 0', 2.1e-4, 6e-6), Moved('tool_pose 2', -2.3e-4, 8e-6))
+    far = (Moved('tool_pose 1', 1e-6, 6e-6), Moved('tool_pose 4', 3e-3, 1e-4))
+    told = Change(
+        *moved[0][:1], 'step', 20000.0, (19993.0, 20000.0), 2.1e-4, 6e-6, 50.0, ('tool *',)
+    )
+    assert sentence(replace(told, together=(*moved, *far))) == (
+        'tool pose error: stepped by 0.2100 ± 0.0060 mm along x, −0.2300 ± 0.0080 mm along z, '
+        '3.00 ± 0.10 mrad about y between 2024-09-27 and 2024-10-04; as well it may be tool.'
+    )
 
 
 def test_what_is_no_history_is_refused(tmp_path):

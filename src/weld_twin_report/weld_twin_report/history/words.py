@@ -12,7 +12,7 @@ import numpy as np
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import REGISTRY
-from weld_twin_core.history import Change, Observation, changes, outlook, reaches
+from weld_twin_core.history import ALL, Change, Observation, changes, outlook, reaches
 from weld_twin_core.twin.directions import CURVE, GIVE
 from weld_twin_nodes.wording.quantities import display_unit, millimetres, odds, uncertain
 from weld_twin_nodes.wording.words import cause
@@ -42,8 +42,8 @@ def observations(entries: Sequence[Entry]) -> list[Observation]:
 def _steady(name: str) -> bool:
     """Return whether a coordinate is how a gear was made: a curve over its angle, waves, or its give."""
     effect = REGISTRY.get(name.split(' ')[0])
-    waves = effect is not None and effect.traits.waves is not None
-    return waves or name.startswith((CURVE, GIVE))
+    made = effect is not None and (effect.traits.waves is not None or not effect.traits.cause)
+    return made or name.startswith((CURVE, GIVE))
 
 
 def named(entries: Sequence[Entry]) -> set[str]:
@@ -106,40 +106,53 @@ def causes_of(effects: Sequence[Mapping[str, Any]], most: int | None = None) -> 
     return ', '.join(shown) + more
 
 
+_PARTS = {'xyz': 'along', 'rotvec': 'about'}
+"""Of parameters that are vectors of a frame, what goes before the axis."""
+
+
 class Coordinate(NamedTuple):
-    """Effect and joint of a coordinate, its name, and factor and unit in which people read it."""
+    """What a coordinate is, in words, and factor and unit in which people read it."""
 
     effect: str
     joint: str | None
     words: str
     factor: float
     unit: str
+    part: str = ''
+    """Which number of its effect it is, such as 'along x'."""
 
 
 def coordinate(name: str) -> Coordinate:
     """Return what a coordinate is, such as 'tool.x' or 'joint_offset elbow_joint 0'."""
+    effect, *joint, number = name.replace(_TOOL, 'tool_pose ').split(' ')
     if name.startswith(_TOOL):
-        axis = name.removeprefix(_TOOL)
-        factor, unit = display_unit(axis, 'rad' if axis.startswith('turn') else 'm')
+        factor, unit = display_unit(number, 'rad' if number.startswith('turn') else 'm')
         # A cell keeps no frames of its controller; the tool's own axes turn about themselves.
-        words = (
-            f'turn of the tool about {axis[-1]}'
-            if 'turn' in axis
-            else f"tool along {axis} of the model's flange"
-        )
-        return Coordinate('tool_pose', None, words, factor, unit)
-    effect, *joint, number = name.split(' ')
+        if number.startswith('turn'):
+            part = f'about {number[-1]}'
+            return Coordinate('tool_pose', None, f'turn of the tool {part}', factor, unit, part)
+        part = f"along {number} of the model's flange"
+        return Coordinate('tool_pose', None, f'tool {part}', factor, unit, part)
     kind = REGISTRY.get(effect)
     parameters = [p for p in kind.parameters if p.differentiable] if kind else []
-    factor, unit = 1.0, ''
+    factor, unit, part = 1.0, '', f'part {int(number) + 1}'
     if parameters:
-        parameter = parameters[min(int(number), len(parameters) - 1)]
+        numbers = [p for p in parameters for _ in range(max(p.size, 1))]
+        parameter = numbers[min(int(number), len(numbers) - 1)]
         factor, unit = display_unit(parameter.name, parameter.unit)
+        if parameter.name in _PARTS:
+            part = f'{_PARTS[parameter.name]} {"xyz"[int(number) % 3]}'
+        elif len(parameters) == 1 and number == '0':
+            part = ''
     where, _, source = ' '.join(joint).partition('<')
-    one = len(parameters) == 1 and number == '0'
-    words = cause(effect, where or None) + ('' if one else f', part {int(number) + 1}')
-    words += f' from {source}' if source else ''
-    return Coordinate(effect, where or None, words, factor, unit)
+    words = whole(name) + (f', {part}' if part else '') + (f' from {source}' if source else '')
+    return Coordinate(effect, where or None, words, factor, unit, part)
+
+
+def whole(name: str) -> str:
+    """Return what a coordinate is a number of: its effect at its joint, or the tool."""
+    effect, *joint, _ = name.replace('.', ' ').split(' ')
+    return cause(effect, ' '.join(joint).partition('<')[0] or None)
 
 
 def date(day: float) -> str:
@@ -151,24 +164,35 @@ def sentence(change: Change) -> str:
     what = coordinate(change.name)
     first, last = (date(day) for day in change.between)
     when = f'between {first} and {last}' if first != last else f'on {last}'
+    size = _sizes(change, WEEK if change.kind == 'trend' else 1.0)
+    name = whole(change.name) if change.together else what.words
     if change.kind == 'step':
-        size = uncertain(change.size, change.std, what.factor, what.unit)
-        said = f'{what.words}: stepped by {size} {when}'
+        said = f'{name}: stepped by {size} {when}'
         if change.since is not None:
             slowly = f'slowly since {date(change.since)}'
-            said = f'{what.words}: changed by {size}, at once {when} or {slowly}'
+            said = f'{name}: changed by {size}, at once {when} or {slowly}'
     elif change.kind == 'trend':
-        size = uncertain(change.size * WEEK, change.std * WEEK, what.factor, what.unit)
         more = ' on top of how it moved before' if change.faster else ''
-        said = f'{what.words}: moves by {size} a week since {date(change.day)}{more}'
+        said = f'{name}: moves by {size} a week since {date(change.day)}{more}'
     else:
-        size = uncertain(change.size, change.std, what.factor, what.unit)
-        said = f'{what.words}: swings by {size} with the seasons'
-    others = [coordinate(name).words for name in change.alike]
+        said = f'{name}: swings by {size} with the seasons'
+    others = [whole(n) if n.endswith(ALL) else coordinate(n).words for n in change.alike]
     if others:
         more = f' or {len(others) - ALIKE} more' if len(others) > ALIKE else ''
         said += f'; as well it may be {", ".join(others[:ALIKE])}{more}'
     return f'{said}.'
+
+
+def _sizes(change: Change, times: float) -> str:
+    """Return how far it moved; of an effect of several, each number beyond its own error."""
+    sizes = []
+    for each in change.together or (change,):
+        what = coordinate(each.name)
+        part = f' {what.part}' if change.together else ''
+        if abs(each.size) > each.std or each.name == change.name:
+            size = uncertain(each.size * times, each.std * times, what.factor, what.unit)
+            sizes.append(size + part)
+    return ', '.join(sizes)
 
 
 def forecast(
@@ -226,6 +250,7 @@ def as_dict(change: Change) -> dict[str, Any]:
         'std': change.std,
         'nats': change.log_bayes,
         'alike': list(change.alike),
+        'together': [each._asdict() for each in change.together],
         'sentence': sentence(change),
     }
 

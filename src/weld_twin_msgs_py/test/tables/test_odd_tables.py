@@ -408,3 +408,21 @@ def test_two_axes_before_a_camera_are_no_wrong_robot(tmp_path):
     said = ' '.join(read_table(path, robot).assumptions)
     assert 'wrong robot' not in said
     assert 'with base and tool fitted, positions are 0.' in said
+
+
+@pytest.mark.parametrize('back', [0.5, 5.0, 3600.0])
+@pytest.mark.parametrize('which', ['log.csv', 'seen.csv'])
+def test_a_clock_set_back_in_one_of_two_files_is_told_with_its_line(tmp_path, back, which):
+    t = np.arange(0.0, 60.0, 0.1)
+    q = Q[0] + 0.2 * np.sin(0.2 * t[:, None] + np.arange(6.0))
+    seen = 1e3 * forward(ARM, q)[:, :3, 3]
+    files = {'log.csv': (J, np.degrees(q)), 'seen.csv': (XYZ, seen)}
+    for name, (header, values) in files.items():
+        clock = 1e9 + np.where((t > 40.0) & (name == which), t - back, t)
+        body = rows(clock[:, None], values, form='{:.4f}')
+        (tmp_path / name).write_text(lines(','.join(['time [s]', *header]), body))
+    with pytest.raises(
+        DataError, match=f"{which}': stamps in 'time .s.' go back in line 403"
+    ) as told:
+        read_two_tables(tmp_path / 'log.csv', tmp_path / 'seen.csv', ARM)
+    assert 'give what follows as a table of its own' in str(told.value)

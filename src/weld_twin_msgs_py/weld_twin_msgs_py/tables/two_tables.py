@@ -101,9 +101,11 @@ def _between(log: Cells, seen: Cells, names: tuple[str, ...], times: Array, own:
     """Return one table of what was measured in a motion, with the joints at its stamps [s]."""
     inside = np.flatnonzero((own >= times[0]) & (own <= times[-1]))
     if not inside.size:
+        late = own[0] - times[0]
         raise DataError(
-            f"no row of '{seen.path}' lies within the time of '{log.path}'; --clock-offset shifts "
-            'the clock of the instrument'
+            f"no row of '{seen.path}' lies within the time of '{log.path}': it begins "
+            f'{abs(late):.1f} s {"after" if late > 0.0 else "before"} it; where that is a zone of the '
+            'time, --clock-offset takes it off (in seconds, added to the clock of the instrument)'
         )
     q = np.column_stack([np.interp(own[inside], times, column) for column in log.stack(names).T])
     return _joined(log, seen.taken(inside), names, q, own[inside])

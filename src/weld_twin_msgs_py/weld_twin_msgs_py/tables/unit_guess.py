@@ -87,6 +87,9 @@ _SERIALS = (25_569.0, 73_051.0)
 """Days from the end of 1899, as Excel counts dates, to 1970 and to 2100."""
 _FASTEST = 5e-4
 """Step [s] that no controller and no tracker is below; as days it is 43 s."""
+_SET_BACK, _TIMES_SET = 3.0, 2
+"""Usual steps by which stamps fall back, and how often, where a clock was set: rows that came late fall
+back by less, rows in another order more often."""
 _MOSTLY = 0.9
 """Share of the rows that are in order at least, for the others to be repeats and no other order."""
 _DATES = ('%d.%m.%Y', '%Y/%m/%d', '%d-%b-%Y', '%Y-%m-%d', '%m/%d/%Y', '%d/%m/%Y', '')
@@ -110,6 +113,8 @@ def stamps(
         return None, f'stamps in {column!r} cannot be read; {order}'
     steps = np.diff(values)
     if not (steps > 0.0).all():  # an empty cell is in no order either
+        if told := set_back(cells, column, values):
+            return None, f'{told}; {order}'
         line = cells.lines[int(np.argmin(steps > 0.0)) + 1]
         return None, (
             f'stamps in {column!r} do not increase from row to row (line {line} is the first); where '
@@ -132,6 +137,19 @@ def _is_serial(values: Array, steps: Array, column: str) -> bool:
     return named or bool(steps.size and np.median(steps) < _FASTEST)
 
 
+def set_back(cells: Cells, column: str, values: Array) -> str:
+    """Return where stamps fall back once or twice, as of a clock that was set; empty where not."""
+    steps = np.diff(values)
+    falls = np.flatnonzero(steps < -_SET_BACK * np.median(np.abs(steps)))
+    if not 0 < falls.size <= _TIMES_SET:
+        return ''
+    line = cells.lines[int(falls[0]) + 1]
+    return (
+        f'stamps in {column!r} go back in line {line}: the clock was set there, or another run begins; '
+        'give what follows as a table of its own'
+    )
+
+
 def later_rows(
     cells: Cells, column: str | None, date: str | None = None
 ) -> NDArray[np.intp] | None:
@@ -139,6 +157,8 @@ def later_rows(
     values = None if column is None else _parsed(cells, column, date)
     if values is None or np.isnan(values).any():
         return None
+    if column is not None and (told := set_back(cells, column, values)):
+        raise DataError(f"table '{cells.path}': {told}")
     before = np.concatenate([[-np.inf], np.maximum.accumulate(values)[:-1]])
     later = np.flatnonzero(values > before)
     return later if later.size >= _MOSTLY * values.size else None

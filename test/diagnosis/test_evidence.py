@@ -69,7 +69,7 @@ def best(columns, y, effective):
     """Return the best choice of a base that may move, its components given as columns."""
     seed = effect('base_pose', xyz=[0, 0, 0], rotvec=[0, 0, 0])
     index = np.arange(len(columns))
-    unit = Unit(Site('base_pose', None), (seed,), (index,), 1.0)
+    unit = Unit(Site('base_pose', None), (seed,), (index,), (0.0,))
     systems = SeedSystems.of([index], [columns @ columns.T])
     systems = systems.given(np.zeros((0, 0)), np.zeros(0), y @ y, (columns @ y)[:, None])
     return ranking(systems, [unit], effective)[0]
@@ -124,10 +124,10 @@ def test_every_unit_has_the_seed_and_the_columns_that_least_squares_choose():
     columns[5] = columns[4] + 0.05 * columns[5]
     y = [1.0, -2.0, 0.5] @ own + 6.0 * (columns[5] - columns[4]) + 0.4 * columns[7]
     y += 0.3 * columns[8] - 0.3 * columns[10] + rng.normal(size=200)
-    index, trials = [np.array(each) for each in SEEDS], (1.0, 7.0, 20.0)
+    index, surprise = [np.array(each) for each in SEEDS], (0.0, 1.9, 2.5, 3.0, 0.7, 30.0)
     ends = ((0, 1), (1, 3), (3, 6))
     units = [
-        Unit(Site(str(k), None), (None,) * (b - a), tuple(index[a:b]), trials[k])
+        Unit(Site(str(k), None), (None,) * (b - a), tuple(index[a:b]), surprise[a:b])
         for k, (a, b) in enumerate(ends)
     ]
     systems = SeedSystems.of(index, [columns[each] @ columns[each].T for each in index])
@@ -138,9 +138,9 @@ def test_every_unit_has_the_seed_and_the_columns_that_least_squares_choose():
         expected = []
         for k, (a, b) in enumerate(ends):
             seeds = [s for s in range(a, b) if open_to is None or open_to[s]]
-            s = max(seeds, key=lambda s: by_hand[s])
+            s = max(seeds, key=lambda s: by_hand[s][0] - surprise[s])
             worth, chosen = by_hand[s]
-            expected.append((worth - np.log(trials[k]), str(k), s - a, chosen))
+            expected.append((worth - surprise[s], str(k), s - a, chosen))
         expected.sort(reverse=True)
         found = ranking(systems, units, 200.0, open_to=open_to)
         assert [(c.unit.site.effect, c.seed, sorted(c.columns)) for c in found] == [

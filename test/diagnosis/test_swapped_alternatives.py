@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.algebra.workspace import Part, Role, ranking
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Alternative
 from weld_twin_core.diagnosis.hypotheses import alternatives, search
-from weld_twin_core.diagnosis.hypotheses.other_sets import Other
+from weld_twin_core.diagnosis.hypotheses.other_sets import Other, Sets, reconsidered
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -83,21 +83,38 @@ def test_what_stands_for_several_gives_way_to_them():
     assert len(candidate_sets) == 2
 
 
-def test_waves_that_came_one_by_one_give_way_to_a_zero_and_one_wave():
+@pytest.mark.parametrize(
+    ('amplitude', 'order'), [([6e-4, 1e-3, 3e-4, 1.4e-3], [4, 1, 5, 3]), (1.2e-3, 2)]
+)
+def test_wrong_waves_give_way_to_a_zero_and_the_right_wave(amplitude, order):
     joint = 'elbow_joint'
     zero, wave = (
         effect('joint_offset', joint=joint, offset=-1e-3),
         effect('transmission_ripple', joint=joint, amplitude=1.9e-3, order=3, phase=-0.75),
     )
     problem, model = tiny((zero, wave))
-    stand_ins = {'amplitude': [6e-4, 1e-3, 3e-4, 1.4e-3], 'order': [4, 1, 5, 3], 'phase': 0.1}
-    ripple = effect('transmission_ripple', joint=joint, **stand_ins)
+    stand_in = {'amplitude': amplitude, 'order': order, 'phase': 0.1}
+    ripple = effect('transmission_ripple', joint=joint, **stand_in)
     work, now = search.workspace(problem, model.with_found((ripple,)), (), Beliefs())
     kept, _ = search.settled(work, now, str)
     found = {e.name: e for e in kept.model.found}
     assert found.keys() == {'joint_offset', 'transmission_ripple'}
     assert found['transmission_ripple'].order == 3
     assert found['joint_offset'].number('offset') == pytest.approx(-1e-3, abs=5e-5)
+
+
+@pytest.mark.parametrize(('order', 'wrong'), [(3, 2), (2, 1)])
+def test_a_single_wave_gives_way_to_one_of_another_order(order, wrong):
+    right, stand_in = (
+        effect(
+            'transmission_ripple', joint='shoulder_pan_joint', amplitude=3e-4, order=o, phase=0.1
+        )
+        for o in (order, wrong)
+    )
+    problem, model = tiny((right,), align=('base', 'tool'))
+    work, now = search.workspace(problem, model.with_found((stand_in,)), (), Beliefs())
+    kept, _ = reconsidered(work, now, Sets.about(work, now))
+    assert [e.order for e in kept.model.found] == [order]
 
 
 @pytest.mark.parametrize('back', [0.0, 0.4])

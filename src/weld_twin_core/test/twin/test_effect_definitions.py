@@ -685,6 +685,15 @@ def test_noise_has_the_deviation_it_is_given_on_every_coordinate():
     np.testing.assert_allclose(np.corrcoef(drawn.T), np.eye(3), atol=0.03)
 
 
+def test_a_search_believes_low_orders_of_a_ripple_as_scales_are_believed():
+    waves = REGISTRY['transmission_ripple'].search.lines('j1', np.arange(1.0, 101.0))
+    believed = np.exp([-wave.search.surprise(100.0) for wave in waves])
+    assert believed.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(believed[[1, 9, 99]] / believed[0], [0.5, 0.1, 0.01])
+    bent = REGISTRY['stiffening']('j1', 0.0, 5.0)
+    assert bent.search.surprise(bent.search.trials(None, 'j1')) > 1.5  # a torque is chosen, too
+
+
 def test_a_number_beside_lists_holds_for_every_order_of_a_ripple(arm, make_recording):
     recording = make_recording(arm)
     short = effect('transmission_ripple', joint='j1', amplitude=1e-3, order=[2, 5])

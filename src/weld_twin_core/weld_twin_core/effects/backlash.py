@@ -196,7 +196,17 @@ _CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
 
 
-class _LoadedSearch(SearchHooks):
+_BENDS = 7
+"""Torques at which a curve may bend, from the least to the most of its `shares`: 1.3 apart."""
+
+
+class _BentSearch(SearchHooks):
+    def trials(self, view: View, joint: str | None) -> float:
+        """Return among how many torques a fit chooses."""
+        return float(_BENDS)
+
+
+class _LoadedSearch(_BentSearch):
     kind: type[LoadedPlay]
 
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
@@ -205,10 +215,6 @@ class _LoadedSearch(SearchHooks):
         friction = self.kind.shares[0] * float(np.abs(torque).max(initial=0.0))
         if friction > 0.0 and not _changes(torque, friction):
             yield self.kind(str(joint), 0.0, friction)
-
-
-_BENDS = 7
-"""Torques at which a curve may bend, from the least to the most of its `shares`: 1.3 apart."""
 
 
 class _BentFit(FitHooks):
@@ -324,6 +330,7 @@ class Stiffening(_BentByLoad):
         by_motion=True,
     )
     parameters = JointCompliance.parameters
+    search = Hooked(_BentSearch)
     shares = (0.1, 0.5)
 
     def bent(self, pull: Array) -> Array:

@@ -187,6 +187,10 @@ class SearchHooks(_Hooks):
         """Return how many instances `seeds` chose among; 0 means as many as it yields."""
         return 0.0
 
+    def surprise(self, among: float) -> float:
+        """Return minus the log probability of this instance, of so many: all are as likely."""
+        return float(np.log(max(among, 1.0)))
+
     @property
     def joins(self) -> bool:
         """Return whether two of a kind on one joint are one effect."""

@@ -55,6 +55,21 @@ class _Search(SearchHooks):
     def orders(self) -> Array:
         return np.atleast_1d(np.asarray(self.effect.order, dtype=np.float64))
 
+    def surprise(self, among: float) -> float:
+        """
+        Return minus the log probability of its order, of those from 1 on.
+
+        An order counts as scales do [1]_: as likely from 1 to 2 as from 50 to 100. Wheels are out of
+        round once and twice a turn; teeth and rollers make any number of waves.
+
+        References
+        ----------
+        .. [1] H. Jeffreys, "Theory of Probability", 3rd ed., Oxford 1961, section 3.1.
+
+        """
+        every = float(np.sum(1.0 / np.arange(1.0, max(among, 1.0) + 1.0)))
+        return float(np.log(self.orders()[0] * every))
+
     def with_orders(self, orders: Array) -> TransmissionRipple:
         own, pairs = self.orders(), self.effect.fit.coordinates().reshape(-1, 2)
         wanted = [pairs[own == order].sum(axis=0) for order in orders]

@@ -68,7 +68,7 @@ class Unit:
     seeds: tuple[Effect, ...]
     """Instances that span it; more than one where a parameter bends the response."""
     columns: tuple[Index, ...]  # column numbers of every seed
-    trials: float  # among how many instances the seeds were chosen
+    surprise: tuple[float, ...]  # minus the log probability of every seed, among those of its kind
     role: Role = Role.FOUND
 
 
@@ -231,6 +231,10 @@ class Choice:
     def columns(self) -> Index:
         return np.asarray(self.alike.columns[self.row][self.chosen])
 
+    @property
+    def surprise(self) -> float:
+        return self.unit.surprise[self.seed]
+
     def effect(self) -> Effect:
         normal = self.alike.normal[self.row][np.ix_(self.chosen, self.chosen)]
         scaled, size = unit_diagonal(normal, REPEATED)
@@ -261,10 +265,10 @@ def ranking(
     for k, (alike, (_, own)) in enumerate(zip(systems.alike, each, strict=True)):
         log_bayes_factor[alike.seeds], group[alike.seeds] = own, k
         row[alike.seeds] = np.arange(alike.seeds.size)
+    log_bayes_factor -= np.concatenate([np.zeros(0), *(unit.surprise for unit in units)])
     if open_to is not None:
         log_bayes_factor[~open_to] = -np.inf
     worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
-    worth = worth - np.log([unit.trials for unit in units])
     result = []
     asked = np.array([unit.role in roles for unit in units], dtype=bool)
     for u in np.flatnonzero(asked & (worth > least)).tolist():
@@ -376,11 +380,16 @@ class Workspace:
         An effect or wave more costs what it costs to enter: that two errors happen to be one is
         seldom.
         """
-        trials = {unit.site: float(np.log(unit.trials)) for unit in self.library.units}
+        surprise = {
+            part: own
+            for unit in self.library.units
+            for seed, own in zip(unit.seeds, unit.surprise, strict=True)
+            for part in parts(seed)
+        }
 
         def cost(result: Fit) -> float:
             each = parts_of(result)
-            return sum(trials.get(part.site, 0.0) + self.beliefs.enter_log_bayes for part in each)
+            return sum(surprise.get(part, 0.0) + self.beliefs.enter_log_bayes for part in each)
 
         more = float(own.coordinates.size - now.coordinates.size)
         count = self.independent((now, own))

@@ -49,15 +49,15 @@ def fit_alternatives(
     count = work.independent([now, *(f for _, f in tried)])
 
     def log_bayes(full: Fit, choice: Choice | None) -> float:
-        freedom, trials = float(full.coordinates.size - rest.coordinates.size), 1.0
+        freedom, surprise = float(full.coordinates.size - rest.coordinates.size), 0.0
         if choice is not None:
             # Unused components of a vector effect buy nothing and cost nothing.
             freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
-            trials = max(choice.unit.trials, 1.0)
+            surprise = choice.surprise
         # What may only stand beside what was found does so as the same on these data, however large.
         alike = choice is not None and choice.unit.role is not Role.FOUND
         size = now.sized - full.sized if alike else 0.0
-        return lead(full, rest, freedom, count) + size - float(np.log(trials))
+        return lead(full, rest, freedom, count) + size - surprise
 
     out = [Alternative(place, log_bayes(now, own), now)]
     for choice, other in tried:

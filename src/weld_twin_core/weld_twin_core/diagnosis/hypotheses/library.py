@@ -129,7 +129,8 @@ class _Shelf:
             columns.append(np.arange(self._count, self._count + piece.count))
             self._count += piece.count
         kept = tuple(seed for seed, _ in shown)
-        self.units.append(Unit(site, kept, tuple(columns), trials, role))
+        surprise = tuple(seed.search.surprise(trials) for seed in kept)
+        self.units.append(Unit(site, kept, tuple(columns), surprise, role))
 
 
 def _shown(seed: Effect, piece: Piece) -> bool:

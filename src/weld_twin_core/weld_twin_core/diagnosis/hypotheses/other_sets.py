@@ -4,9 +4,9 @@
 Other sets of effects that explain the recordings: the search, without what it took in early.
 
 An effect that enters early may stand for several, and then keeps them out: a base that moved for a
-zero and a spring. So each effect found, and each wave of several, is forbidden in turn, and the set is
-completed without it, by products of columns that are computed once. Waves are chosen anew all
-together, too.
+zero and a spring. So each effect found, and each wave of a gear, is forbidden in turn, and the set is
+completed without it, by products of columns that are computed once. Several waves are chosen anew
+all together, too.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Sets:
         # Sets that grow from different beginnings are often the same, and what is pruned was grown.
         asked = self.count, *columns
         if asked not in self._worth:
-            cost = sum(float(np.log(one.unit.trials)) + self.enter_log_bayes for one in chosen)
+            cost = sum(one.surprise + self.enter_log_bayes for one in chosen)
             normal, pull = self._equations(columns)
             gain = float(pull @ solve_scaled(normal, pull, REPEATED))
             freedom = float(len(columns))
@@ -185,12 +185,12 @@ def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
     found = [parts(effect) for effect in now.model.found]
     chosen, out = sets.of(part for each in found for part in each), []
     least = sets.worth(chosen) - work.beliefs.alternative_log_bayes
-    several = [each for each in found if len(each) > 1]
+    waves = [each for each in found if each[0].order is not None]
     ways: list[tuple[list[Part], Part | None]] = [
         ([Part(place)], Part(place)) for place in sites(now)
     ]
-    ways += [([wave], wave) for each in several for wave in each]
-    ways += [(each, None) for each in several]
+    ways += [([wave], wave) for each in waves for wave in each]
+    ways += [(each, None) for each in waves if len(each) > 1]
     for left, never in ways:
         kept = [c for c in chosen if not {c.part, Part(c.unit.site)} & set(left)]
         other = sets.without(kept, never)

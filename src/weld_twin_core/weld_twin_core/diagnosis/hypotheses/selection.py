@@ -71,13 +71,13 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
     while ranked:
         slack = max(beliefs.close_log_bayes, beliefs.beaten_share * ranked[0].log_bayes)
         close = [c for c in ranked if c.log_bayes > ranked[0].log_bayes - slack][:SHORTLIST]
-        tried = [(work.fitted_with(now.model, c.effect()), c.unit) for c in close]
+        tried = [(work.fitted_with(now.model, c.effect()), c) for c in close]
         count = work.effective(min((one for one, _ in tried), key=lambda f: f.rss), beliefs.hope)
         worth = []
-        for one, unit in tried:
+        for one, choice in tried:
             freedom = one.coordinates.size - now.coordinates.size
             log_bayes = lead(one, now, freedom, count)
-            worth.append((log_bayes - float(np.log(unit.trials)), one, unit))
+            worth.append((log_bayes - choice.surprise, one, choice.unit))
         worth = [item for item in worth if item[0] > beliefs.enter_log_bayes]
         absurd = [(unit.site, e) for _, one, unit in worth for e in implausible(one.model)]
         impossible += [effect for _, effect in absurd]

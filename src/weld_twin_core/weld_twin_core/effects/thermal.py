@@ -24,6 +24,9 @@ from .effect import Effect, FitHooks, Hooked, LinearEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number, radians
 
+_REFERENCE = 20.0
+"""Temperature [degC] at which the model holds unless something else is said, as lengths do (ISO 1)."""
+
 
 @register
 class ThermalGrowth(LinearEffect):
@@ -35,7 +38,7 @@ class ThermalGrowth(LinearEffect):
     """
 
     coefficient: Value = 0.0
-    reference: float = 20.0
+    reference: float = _REFERENCE
     links: Sequence[str] | None = None
     warmup: Sequence[float] | None = None
 
@@ -211,7 +214,7 @@ class _WarmUp(Effect):
         for share in _CONSTANTS:
             yield kind(str(joint), 0.0, share * span)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
-            yield kind(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
+            yield kind(str(joint), 0.0, span, (_REFERENCE, rise))
 
 
 @register

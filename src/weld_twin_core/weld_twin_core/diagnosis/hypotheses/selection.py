@@ -88,8 +88,6 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
             best = possible(work, one, [])
             if unit.site in sites(best):
                 return _Step(best, f'{unit.site} (+{log_bayes:.0f})', impossible, passed)
-        if not absurd:
-            break
         passed |= not all(_misshapen(now.model.robot, effect) for _, effect in absurd)
         ranked = [choice for choice in ranked if choice not in close]
     return _Step(now, None, impossible, passed)

@@ -11,7 +11,7 @@ from scipy.stats import cauchy, norm
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.fit import Fit
-from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
+from weld_twin_core.diagnosis.algebra.independent_rows import effective_share, visited
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.algebra.workspace import SeedSystems, Unit, evidence, ranking
 from weld_twin_core.diagnosis.result import Site
@@ -63,6 +63,21 @@ def test_a_size_counts_as_often_as_machines_have_it():
     model = Model(robot, (np.eye(4),), found=(large, small))
     expected = cauchy.logpdf([4.0, 0.2]) - cauchy.logpdf(0.0)
     assert Fit(model, np.zeros(0)).sized == pytest.approx(expected.sum())
+
+
+def test_visits_of_a_station_count_as_one_as_far_as_they_agree():
+    rng = np.random.default_rng(4)
+    postures, order = rng.normal(size=(300, 6)), rng.permutation(np.repeat(np.arange(300), 3))
+    q = postures[order] + rng.uniform(-5e-4, 5e-4, size=(900, 6))
+    station = visited(q)
+    assert np.unique(np.stack([station, order]), axis=1).shape == (2, 300)
+    missed, noise = rng.normal(size=(300, 3))[order], rng.normal(size=(900, 3))
+    for size, share in ((0.0, 1.0), (1.0, 1.0 / (1.0 + 2.0 * 0.5)), (30.0, 1.0 / 3.0)):
+        residual = (size * missed + noise).ravel()
+        assert effective_share(residual, (3,), (900,), (station,)) == pytest.approx(
+            share, abs=0.04
+        )
+        assert effective_share(residual, (3,), (900,)) > 0.9
 
 
 def best(columns, y, effective):

@@ -4,37 +4,78 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
-from .negligible import SLIGHT
+from .negligible import EMPTY, SLIGHT
 
 Row = TypeVar('Row', bound=np.generic)
 ENOUGH = 12
 """Samples from which on they tell how wide they spread: a median is then good to a quarter."""
 FEWEST = 3
 """Numbers from which on they show a spread at all: that of two says nothing."""
+SAME_STATION = 2e-3
+"""Stations closer than this in every joint [rad, m] are visits of one."""
 NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size: 1 / 0.6745."""
 
 
-def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, ...]) -> float:
+def effective_share(
+    residual: Array,
+    rows: tuple[int, ...],
+    samples: tuple[int, ...],
+    stations: Sequence[NDArray[np.intp] | None] = (),
+) -> float:
     """
-    Return the share of rows that count as independent, from the residual's autocorrelation.
+    Return the share of rows that count as independent, as a residual hangs together.
 
-    Initial positive sequence estimate [1]_ on every component of every recording.
+    In time by its autocorrelation, the initial positive sequence estimate [1]_ on every component of
+    every recording. Where stations are visited again by how far their visits agree [2]_: what is
+    not explained at a station is there at every visit.
+
+    stations: of every recording the station of each sample, (M,); None where nothing is visited again.
 
     References
     ----------
     .. [1] C. J. Geyer, "Practical Markov chain Monte Carlo", Statist. Sci. 7, 1992.
+    .. [2] L. Kish, "Survey Sampling", Wiley 1965, section 5.4: m units that correlate by r count as
+       m / (1 + (m - 1) r).
 
     """
-    parts = by_sample(residual, rows, samples)
-    shares = [1.0 / _correlation_time(part - part.mean(axis=0)) for part in parts]
+    parts = [part - part.mean(axis=0) for part in by_sample(residual, rows, samples)]
+    shares = [1.0 / _correlation_time(part) for part in parts]
+    for k, station in enumerate(stations):
+        if station is not None:
+            shares[k] = min(shares[k], _share_of_visits(parts[k], station))
     counts = [part.size for part in parts]
     return float(np.average(shares, weights=counts))
+
+
+def visited(q: Array) -> NDArray[np.intp]:
+    """Return which station each of some postures (M, n) is, (M,)."""
+    order = np.lexsort(np.round(q / SAME_STATION).T)
+    apart = np.abs(np.diff(q[order], axis=0)).max(axis=1) >= SAME_STATION
+    out = np.empty(len(q), dtype=np.intp)
+    out[order] = np.concatenate([[0], np.cumsum(apart)])
+    return out
+
+
+def _share_of_visits(part: Array, station: NDArray[np.intp]) -> float:
+    """Return the share of rows (M, c) that count beside other visits of their station, (M,)."""
+    count = np.bincount(station)
+    again = count > 1
+    sums = np.zeros((count.size, part.shape[1]))
+    np.add.at(sums, station, part)
+    mean = sums / count[:, None]
+    freedom = (count[again] - 1).sum() * part.shape[1]
+    within = float(((part - mean[station]) ** 2).sum() / freedom)
+    between = max(float((mean[again] ** 2).mean()) - within / float(count[again].mean()), 0.0)
+    alike = between / max(between + within, EMPTY)
+    return float(np.mean(1.0 / (1.0 + (count[station] - 1) * alike)))
 
 
 def _correlation_time(part: Array) -> float:

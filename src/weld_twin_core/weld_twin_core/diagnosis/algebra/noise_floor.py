@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from .independent_rows import ENOUGH, measured_axes, robust_spread
+from .independent_rows import ENOUGH, measured_axes, robust_spread, visited
 from .problem import Problem
 
 NANOMETRE = 1e-9
@@ -18,8 +18,6 @@ MICROMETRE = 1e-6
 """Least error [m] that any instrument sees."""
 THIRD = 20.0
 """Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
-SAME_STATION = 2e-3
-"""Stations closer than this in every joint [rad, m] are repeats of one pose."""
 WIDEST = 3.5e-4
 """Noise of a coordinate [m] beyond which what a model leaves is not taken for an instrument's. Trackers
 have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is wider has to show by
@@ -78,8 +76,9 @@ def _differences(position: Array) -> float | None:
 def _repeats(q: Array, position: Array) -> float | None:
     if q.shape[0] != position.shape[1]:
         return None
-    order = np.lexsort(np.round(q / SAME_STATION).T)
-    close = np.abs(np.diff(q[order], axis=0)).max(axis=1) < SAME_STATION
+    station = visited(q)
+    order = np.argsort(station, kind='stable')
+    close = np.diff(station[order]) == 0
     if close.sum() < ENOUGH:
         return None
     change = np.diff(position[:, order], axis=1)[:, close]

@@ -17,7 +17,6 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arrays import Array
 from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
-from .independent_rows import effective_share
 from .negligible import FLAT
 from .problem import ROWS, Model, Problem, Scale
 
@@ -85,7 +84,7 @@ def keep_open_directions(
     for _ in range(ROUNDS):
         model = stepped(problem, model, _closed_step(problem, model, scale, precision, free))
     residual = problem.whitened(problem.residuals(model), scale)
-    share = effective_share(result.residual, problem.rows, problem.samples)
+    share = problem.independent_share(result.residual)
     most = WORSE * free.vectors.shape[1] / share * result.rss / max(result.residual.size, 1)
     if residual @ residual > result.rss + most:
         return result

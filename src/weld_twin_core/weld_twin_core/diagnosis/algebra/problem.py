@@ -24,7 +24,7 @@ from ...pose_noise import Common
 from ...recording import Counted, Recording
 from ...twin.features import Features, Remembered
 from ...twin.twin import Twin
-from .independent_rows import by_sample
+from .independent_rows import by_sample, effective_share, visited
 from .negligible import ROUNDING
 
 FRAMES = ('base', 'tool')
@@ -82,6 +82,22 @@ class Problem:
     @property
     def at_rest(self) -> bool:
         return all(recording.joints.static for recording in self.recordings)
+
+    @cached_property
+    def stations(self) -> tuple[NDArray[np.intp] | None, ...]:
+        """Return which station every sample of each recording is of; None where each is visited once."""
+        out: list[NDArray[np.intp] | None] = []
+        for k, recording in enumerate(self.recordings):
+            own = None
+            if recording.joints.static and self.contact(k) is None and self.samples[k] > 1:
+                own = visited(recording.joints.at(recording.seen.t)[0])
+            again = own is not None and int(own.max()) + 1 < own.size
+            out.append(own if again else None)
+        return tuple(out)
+
+    def independent_share(self, residual: Array) -> float:
+        """Return the share of a residual that counts as independent rows; see `effective_share`."""
+        return effective_share(residual, self.rows, self.samples, self.stations)
 
     def contact(self, k: int) -> Unknowns | None:
         """Return what the contacts of recording k see; None where an instrument measured."""

@@ -25,7 +25,7 @@ from ..beliefs import Beliefs
 from .columns import Columns, designed
 from .definite import Index, unit_diagonal
 from .fit import Fit, design, fit, predict_fit
-from .independent_rows import FEWEST, effective_share
+from .independent_rows import FEWEST
 from .negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from .problem import Model, Problem, Scale, Site
 from .starts import started
@@ -321,7 +321,7 @@ class Workspace:
         trust: exponent by which autocorrelation is believed: causes still missing make it theirs.
         """
         problem, beliefs, found = self.problem, self.beliefs, result.model.found
-        share = effective_share(result.residual, problem.rows, problem.samples) ** trust
+        share = problem.independent_share(result.residual) ** trust
         count = share * max(result.residual.size - problem.frame_count, 1)
         # What entered first explains most, and so does what its formula misses.
         misfit = beliefs.misfit * (found[0].fit.ideal if found else 1.0)

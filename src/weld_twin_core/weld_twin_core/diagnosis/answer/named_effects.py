@@ -26,7 +26,6 @@ from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance, designed
 from ..algebra.fit import coordinates, frame_prior, trusted
-from ..algebra.independent_rows import effective_share
 from ..algebra.negligible import EMPTY, SLIGHT
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import profile
@@ -252,7 +251,7 @@ def _noise_unsure(
     result: Search, unseen: Unseen, noise: float, before: float, after: float
 ) -> float:
     """Return how far off the noise's part of the gap may be, standard deviation [m^2]."""
-    share = effective_share(result.final.residual, result.problem.rows, result.problem.samples)
+    share = result.problem.independent_share(result.final.residual)
     count = 3 * share * unseen.trusted_labels().size
     # It happens to lie along the gap or against it; and its square is known from so many rows.
     along = 2.0 * np.sqrt(noise * before / count) * after / before

@@ -20,7 +20,6 @@ from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
 from ..advice.separation import Explanation
 from ..algebra.fit import fit
-from ..algebra.independent_rows import effective_share
 from ..algebra.motions import narrow
 from ..algebra.negligible import FLAT
 from ..algebra.problem import ROWS, Scale
@@ -97,7 +96,7 @@ def _parting(
 def _as_weighed(result: Search) -> Scale:
     """Return the noise, as much larger as rows count less beside large effects (`effective`)."""
     fit, problem, scale = result.small, result.work.problem, result.work.scale
-    apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
+    apart = problem.independent_share(fit.residual) * fit.residual.size
     wider = float(np.sqrt(max(apart / max(result.effective(fit), FLAT), 1.0)))
     return replace(scale, position=wider * scale.position, orientation=wider * scale.orientation)
 

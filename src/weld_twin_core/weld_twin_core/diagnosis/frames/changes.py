@@ -35,7 +35,6 @@ from ..algebra.fit import (
     robust_scale,
     with_weights,
 )
-from ..algebra.independent_rows import effective_share
 from ..algebra.motions import constant, of_no_size
 from ..algebra.negligible import REPEATED, REWEIGHTED
 from ..algebra.problem import ROWS, Change, Model, Problem, Scale
@@ -146,7 +145,7 @@ def _chosen(
     residual = problem.whitened(problem.residuals(model), scale)
     ridge, off = frame_prior(problem, model)
     ridge, x = np.concatenate([ridge, precision]), np.concatenate([off, coordinates(model)])
-    share = effective_share(residual, problem.rows, problem.samples)
+    share = problem.independent_share(residual)
     normal = share * columns @ columns.T + np.diag(ridge)
     parts = _places(problem, model)
     own = np.zeros(x.size)
@@ -229,7 +228,7 @@ def list_changes(
         return ()
     columns, ridge = _columns(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
-    share = effective_share(residual, problem.rows, problem.samples)
+    share = problem.independent_share(residual)
     whole = columns_covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
     parts = _places(problem, model)
     pairs = zip(model.changes, parts, strict=True)

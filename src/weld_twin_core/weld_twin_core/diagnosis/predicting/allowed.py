@@ -39,7 +39,6 @@ from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.twin import Twin
 from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, PROBE, Fit
-from ..algebra.independent_rows import effective_share
 from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.noise_floor import MICROMETRE, NoiseFloor
 from ..algebra.open_directions import AXES, in_words, open_directions
@@ -208,7 +207,7 @@ def _rows(problem: Problem, model: Model, scale: Scale, what: Directions, prior:
         # What hangs together because an arm has small errors is no noise: coordinates take it.
         free = Conditioning(Rows(columns, residual, 1.0), prior, prior.width, 1.0)
         left = residual - free.given()[0] @ columns
-    share = effective_share(left, problem.rows, problem.samples)
+    share = problem.independent_share(left)
     moved = None
     if problem.touched:
         moved = np.sqrt(sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in whole))

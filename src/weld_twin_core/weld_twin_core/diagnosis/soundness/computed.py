@@ -16,8 +16,7 @@ import numpy as np
 from ...arrays import Array, spread_over
 from ...recording import JointMotion, Recording
 from ..algebra.fit import effect_precision, fit
-from ..algebra.independent_rows import robust_spread
-from ..algebra.noise_floor import SAME_STATION
+from ..algebra.independent_rows import SAME_STATION, robust_spread
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
 from .evidence import Case, Finding, mistake, note

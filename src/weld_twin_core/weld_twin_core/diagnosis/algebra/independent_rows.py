@@ -9,6 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ...arrays import Array
 from .negligible import EMPTY, SLIGHT
@@ -57,11 +60,9 @@ def effective_share(
 
 def visited(q: Array) -> NDArray[np.intp]:
     """Return which station each of some postures (M, n) is, (M,)."""
-    order = np.lexsort(np.round(q / SAME_STATION).T)
-    apart = np.abs(np.diff(q[order], axis=0)).max(axis=1) >= SAME_STATION
-    out = np.empty(len(q), dtype=np.intp)
-    out[order] = np.concatenate([[0], np.cumsum(apart)])
-    return out
+    one, other = cKDTree(q).query_pairs(SAME_STATION, p=np.inf, output_type='ndarray').T
+    near = coo_matrix((np.ones(one.size), (one, other)), shape=2 * (len(q),))
+    return np.asarray(connected_components(near, directed=False)[1], dtype=np.intp)
 
 
 def _share_of_visits(part: Array, station: NDArray[np.intp]) -> float:

@@ -148,7 +148,7 @@ def fit(
     prior = effect_precision(model) if precision is None else precision
     start = _Point.at(problem, model, scale, prior)
     columns = start.columns()
-    start = _levelled(start, columns)
+    start = _levelled(start, columns) if iterations else start
     here = _descended(start, columns, iterations, tolerance, most)
     if problem.at_rest and here.believed > STRAINED and scale.position > LEAST_NOISE:
         # What a cause that is not fitted yet leaves was taken for noise, beside which few stations

@@ -20,6 +20,10 @@ from ..result import Site
 
 ROUNDS = 3
 """Times that a choice is made anew at what it led to: the second seldom changes anything."""
+SHORT = 1
+"""How often the best may be worth less than they looked before the search ends: by columns alone a
+size counts for nothing, and play may be below zero. Without an end the search of a hundred sealed
+cells took 1.6 times as long, and no answer was better."""
 
 
 class _Step(NamedTuple):
@@ -67,8 +71,8 @@ def forward(
 
 def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
     """Return the step that the best choice is, without what it drives beyond what machines have."""
-    beliefs, impossible, passed = work.beliefs, list[Effect](), False
-    while ranked:
+    beliefs, impossible, passed, short = work.beliefs, list[Effect](), False, 0
+    while ranked and short <= SHORT:
         slack = max(beliefs.close_log_bayes, beliefs.beaten_share * ranked[0].log_bayes)
         close = [c for c in ranked if c.log_bayes > ranked[0].log_bayes - slack][:SHORTLIST]
         tried = [(work.fitted_with(now.model, c.effect()), c) for c in close]
@@ -88,6 +92,7 @@ def _with_best(work: Workspace, now: Fit, ranked: list[Choice]) -> _Step:
             best = possible(work, one, [])
             if unit.site in sites(best):
                 return _Step(best, f'{unit.site} (+{log_bayes:.0f})', impossible, passed)
+        short += not absurd
         passed |= not all(_misshapen(now.model.robot, effect) for _, effect in absurd)
         ranked = [choice for choice in ranked if choice not in close]
     return _Step(now, None, impossible, passed)

@@ -219,6 +219,13 @@ def test_a_knock_is_one_change_of_one_frame():
     assert (alone.name, alone.together, alone.alike) == ('tool.y', (), ())
 
 
+def test_a_tool_that_was_swapped_for_a_week_is_told_once_each_way():
+    """It moves by a hundred times of what is believed of a tool's place."""
+    found = changes(framed(year(2, lambda week: 100.0 * only(2, 1.0, 20)(week) * (week < 21), 30)))
+    assert [(each.name, each.kind) for each in found] == [('tool.z', 'step')] * 2
+    assert sorted(each.size for each in found) == pytest.approx([-100.0, 100.0], rel=0.01)
+
+
 def test_of_what_no_motion_shows_nothing_is_told():
     """Two coordinates that move nothing have values of rounding alone."""
     rng = np.random.default_rng(4)

@@ -687,7 +687,9 @@ class _System:
                 )
                 for other in result[: k + 1]
             ]
-            row[-1] = row[-1] + self._believed(each.shape, places).reshape(row[-1].shape)
+            # Of what nobody has seen there is rounding alone.
+            floor = _SHOWN * self._believed(each.shape, places)
+            row[-1] = row[-1] + floor.reshape(row[-1].shape)
             blocks.append([b.reshape(-1, each.width).T for b in row])
             right.append(series.told(columns)[:, places].ravel())
         self._matrix = _symmetric(blocks)

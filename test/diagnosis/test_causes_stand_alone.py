@@ -154,3 +154,17 @@ def test_drives_run_through_a_wrist_whose_axes_meet(name, many):
     still = View(robot, np.zeros(1), np.zeros(1), *np.zeros((2, 1, robot.n)))
     sources = [seed.source for seed in JointCoupling.seeds(still, robot.joint_names[-1])]
     assert sources == list(robot.joint_names[-2 : -2 - many : -1])
+
+
+def test_what_is_left_above_a_noise_that_is_given_is_told_beside_causes_that_are_named():
+    # Far more than the instrument's certificate allows, and it depends on nothing.
+    recording = cell(TRUE[1:2])
+    rng, measured = np.random.default_rng(3), recording.measured
+    position = measured.position + rng.normal(scale=10.0 * SIGMA, size=measured.position.shape)
+    given = np.full(position.shape[0], SIGMA)
+    measured = replace(measured, position=position, sigma=given)
+    told = diagnose([recording.with_measured(measured)], load(ARM), align='base', experiment=False)
+    first, left = told.causes
+    assert told.status in NAMING and told.unexplained.above_noise
+    assert first.name[0][0].joint == 'joint_a2' and not first.rest
+    assert left.rest and not left.place and left.share == pytest.approx(told.shares.unexplained)

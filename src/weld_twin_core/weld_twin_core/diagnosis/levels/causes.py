@@ -78,7 +78,7 @@ def causes(
     ]
     # Of what nothing is known, neither a place nor what stands beside it, there is nothing to tell.
     much = remaining > beliefs.unexplained and bool(out)
-    if rest is not None and (much or (rest.place and not out)):
+    if much or (rest.place and not out):
         error = float(np.sqrt((spread**2).sum()))
         out.append(replace(_sized(rest, remaining, error), rest=True))
     # What has no place either says nothing that somebody could begin with.
@@ -159,11 +159,10 @@ def _nameless(
     verdict: Verdict,
     curved: Curved | None,
     placing: FreeForm,
-) -> tuple[list[Cause], Cause | None]:
-    """Return all claims with those of curves that the model holds, and what is left beside."""
+) -> tuple[list[Cause], Cause]:
+    """Return all claims with those of curves that the model holds, and what may be left beside."""
     if verdict.status != 'unknown':
-        # What was found and does not count as named is left, and nothing else says where it sits.
-        return named, _rest([]) if len(named) < len(result.candidate_sets) else None
+        return named, _rest([])  # nothing says where what is left sits
     model = result.final.model.found
     places = _by_place(placing.parts)
     curves_at = _curves_by_place(places, curved) if places else {}

@@ -708,6 +708,37 @@ def test_abb_places_derived_from_a_point_go_along_with_it(call, moved):
 
 
 @pytest.mark.parametrize(
+    ('between', 'increment', 'known'),
+    [
+        ('DO[5]=ON', 'W = 0, P = 0, R = 0', True),
+        ('WAIT .30(sec)', 'W = 0, P = 0, R = 0', True),
+        ('CALL CLEAN', 'W = 0, P = 0, R = 0', False),
+        ('LBL[1]', 'W = 0, P = 0, R = 0', False),
+        ('UFRAME[1]=PR[2]', 'W = 0, P = 0, R = 0', False),
+        ('DO[5]=ON', 'W = 0, P = 0, R = 5', False),
+    ],
+)
+def test_a_fanuc_increment_goes_along_with_the_point_before(between, increment, known):
+    point = "P[{}]{{\n GP1:\n UF : 0, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n {}\n}};\n"
+    text = (
+        '/PROG A\n/MN\n   1:L P[1] 100mm/sec FINE ;\n'
+        f'   2:  {between} ;\n   3:L P[2] 100mm/sec FINE INC ;\n/POS\n'
+        + point.format(1, 'X = 800, Y = 0, Z = 300, W = 180, P = 0, R = 0')
+        + point.format(2, f'X = 0, Y = 0, Z = 50, {increment}')
+        + '/END\n'
+    )
+    program = read('fanuc-ls', (text,))
+    last = program.steps[-1]
+    if not known:
+        assert last.shift.why
+        return
+    place = last.end.before @ program.points[last.end.point].value
+    assert not last.end.leads and not last.shift.why
+    np.testing.assert_allclose(place[:3, 3], [0.8, 0.0, 0.35])
+    np.testing.assert_allclose(place[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-12)
+
+
+@pytest.mark.parametrize(
     ('line', 'held'), [('PR[1]=P[2]', {'P[2]'}), ('L P[R[3]] 5mm/sec FINE', {'P[1]', 'P[2]'})]
 )
 def test_fanuc_points_that_something_else_uses_are_left(line, held):

@@ -23,7 +23,7 @@ from weld_twin_core.motion.programs.travel import Kind
 
 from .build import TURNS, WRIST, Program, Ref, Step, flags_kept
 from .controllers import Context, Frame
-from .reader import LEAST_SPEED, Blocks, Reader, unclear_shift
+from .reader import LEAST_SPEED, Blocks, Reader, same_frame, unclear_shift
 from .source import FANUC_POSE, NUMBER, Notation, Number, Source, closing
 
 POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')
@@ -44,6 +44,8 @@ _DISPLACING = re.compile(
 )
 """What shifts moves, lets them follow a sensor or give way, and what ends that."""
 _CONFIG = re.compile(r"\bCONFIG\s*:\s*'([A-Z ]*)")
+_IN_PLACE = re.compile(r'(?:!|//|\Z|(?:[DRGA]O|R)\[|(?:WAIT|Arc|Weld)\b)')
+"""Statements in which no arm moves, and which are no other line's aim."""
 _COORD = re.compile(r'\bCOORD\b')
 _TRACKING = re.compile(r'^[ \t]*LINE_TRACK_SCHEDULE_NUMBER[ \t]*:[ \t]*[1-9]', re.M)
 """Head of a program whose points move with a conveyor; the schedule 0 is none."""
@@ -68,6 +70,8 @@ class FanucReader(Reader):
         self.untaught: dict[int, str] = {}
         self.config: dict[int, str] = {}
         self.blocks = Blocks(self.program, shift=unclear_shift)
+        self.still = False
+        """Whether nothing since the last move moves the arm, and no other line leads here."""
 
     def read(self) -> Program:
         parts = {result[1]: result.start() for result in _PART.finditer(self.text)}
@@ -188,7 +192,12 @@ class FanucReader(Reader):
         move = _MOVE.match(text)
         self._hold_used(text, where, move is not None)
         if move is None:
-            return
+            self.still &= _IN_PLACE.match(text) is not None
+        else:
+            self._move(move, where)
+            self.still = True
+
+    def _move(self, move: re.Match[str], where: str) -> None:
         kind, via = _KINDS.get(move[1], 'linear'), None
         name, index, tail = move[2], move[3], move[4]
         if kind == 'circular':
@@ -202,12 +211,26 @@ class FanucReader(Reader):
         if point is None or (kind == 'circular' and via is None):
             self.program.unknown(kind, where, self._why(name, index))
             return
-        why = f'{found[0]} shifts it' if found else ''
+        beside = self._beside(kind, point, tail) if self.still else None
+        why = f'{found[0]} shifts it' if found and beside is None else ''
         why = why or (f'{move[1]} is not understood' if move[1] not in _KINDS else '')
         why = why or self.another_posture(kind, point, self.config[point])
         if _COORD.search(tail) and not self.context.controller.external:
             why = 'COORD lets it go along with a group that the robot file does not have'
-        self._add(kind, where, via, point, tail, Frame('', why=why) if why else self.shift)
+        self._add(kind, where, via, point, tail, Frame('', why=why) if why else self.shift, beside)
+
+    def _beside(self, kind: Kind, point: int, tail: str) -> Ref | None:
+        """Return where an increment leads that shifts the tool from where the last move led."""
+        before, value = self.program.pieces[-1][-1:], self.program.points[point].value
+        if kind != 'linear' or [word.upper() for word in _SHIFTING.findall(tail)] != ['INC']:
+            return None
+        if not before or before[0].end is None or before[0].shift.why or value.ndim == 1:
+            return None
+        old = self.program.points[before[0].end.point].value
+        tool, base = self.frames[point]
+        alike = same_frame(tool, before[0].tool) and same_frame(base, before[0].base)
+        plain = old.ndim == 2 and np.array_equal(value[:3, :3], np.eye(3))
+        return before[0].end.beside(before=value) if alike and plain else None
 
     def _hold_used(self, text: str, where: str, moves: bool) -> None:
         if re.search(r'(?<![A-Z])P\[\s*(?:A?R)\[', text):
@@ -220,13 +243,20 @@ class FanucReader(Reader):
                     self.program.hold(point, f'P[{result[1]}] is used at {where} by no move')
 
     def _add(
-        self, kind: Kind, where: str, via: int | None, point: int, tail: str, shift: Frame
+        self,
+        kind: Kind,
+        where: str,
+        via: int | None,
+        point: int,
+        tail: str,
+        shift: Frame,
+        beside: Ref | None = None,
     ) -> None:
         tool, base = self.frames[point]
         step = Step(
             kind,
             where,
-            Ref(point),
+            beside or Ref(point),
             None if via is None else Ref(via),
             tool,
             base,

@@ -31,7 +31,7 @@ from weld_twin_core.diagnosis.soundness.slips import (
 from weld_twin_core.diagnosis.soundness.snapshot import Snapshot, of_joints
 from weld_twin_core.diagnosis.soundness.stamps import streams
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions
-from weld_twin_core.effects import JointOffset
+from weld_twin_core.effects import JointCompliance, JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
 from weld_twin_core.effects.geometry import LinkLength, LinkOffset, LinkTwist, ToolPose
 from weld_twin_core.recording import JointMotion
@@ -322,3 +322,18 @@ def test_a_small_step_of_the_set_up_is_warned_of_and_one_of_a_joint_is_not(ur5, 
     vars(case).update(changes=[before])
     (found,) = setup(case)
     assert found.sentence.startswith('The set-up moved by 0.2 mm before run')
+
+
+def test_a_tool_that_was_hit_between_two_days_shows_beside_a_spring_once_that_is_found():
+    robot, rng = catalog.load('ur5'), np.random.default_rng(3)
+    spring = JointCompliance('shoulder_lift_joint', 4e-5)
+    hit = ToolPose((4e-4, 0.0, 0.0), (0.0, 0.0, 0.0))
+    days = [
+        recorded(robot, stations(robot, rng, 40), rng, effects, name=name)
+        for name, effects in (('one', [spring]), ('two', [spring, hit]))
+    ]
+    told = diagnose(days, robot, align='base,tool', experiment=False)
+    assert told.effects[0].effect.key == spring.key
+    (check,) = (one for one in told.checks if one.name == 'tools')
+    assert check.level == 'warning'
+    assert 'of two sits elsewhere than that of one: 0.39' in check.sentence

@@ -157,6 +157,7 @@ def _explained(
     examined = _without_slips(result, examined, exclude, beliefs, progress)
     if examined.posed is None:
         return refusal(examined)
+    examined = examined.comparing_tools(result.problem, result.final.model)
     out = _conclude(result, examined, holdout, beliefs, limits, progress)
     # Where the answer that no name fits is itself probably right, the many are not tried.
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER

@@ -114,6 +114,23 @@ class Examined:
             unsound=(*self.unsound, *(m.as_unsound(applied=False) for m in mistakes)),
         )
 
+    def comparing_tools(self, problem: Problem, model: Model) -> Examined:
+        """
+        Return the same, the tools of several recordings compared once more.
+
+        Beside the gap that a spring makes another tool hardly shows: ``model`` has it explained.
+        """
+        if problem.touched:
+            return self
+        known = replace(model, known=(*model.known, *model.found), found=())
+        told = [
+            Check('tools', 'warning', f'{each.sentence} {each.remedy}'.strip())
+            for each in parted(Case(problem, known))
+        ]
+        if not told:
+            return self
+        return replace(self, checks=(*told, *(c for c in self.checks if c.name != 'tools')))
+
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         """Return other recordings of the same cell after the same corrections."""
         out = Given(tuple(recordings), self.given.robot, self.given.align)

@@ -265,10 +265,15 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
         return [first, f'Its curve {fault}: do not correct programs by it.']
     others = against(diagnosis)
     without = f', without that of {others}' if others else ''
+    falls = f'the largest deviation goes from {_both(remaining)}'
+    if remaining.largest_after >= remaining.largest:
+        falls = (
+            f'the RMS goes from {millimetres(remaining.rms)} to {millimetres(remaining.rms_after)}'
+        )
     return [
         first,
         f'Until that is found, programs can be corrected by its curve{without} (weld-twin '
-        f'correct): the largest deviation goes from {_both(remaining)}.',
+        f'correct): {falls}.',
     ]
 
 

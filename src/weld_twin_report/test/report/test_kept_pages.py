@@ -24,6 +24,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Candidate, Check, Family, Found, Shares, Site
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion
+from weld_twin_nodes.wording import mending
 from weld_twin_nodes.wording.mending import remaining_without
 from weld_twin_report.report import print_summary, report_page, sections
 from weld_twin_report.report.answer import Answer
@@ -513,3 +514,16 @@ def test_a_sheet_is_as_it_was_kept(name, kept):
 def test_what_is_said_otherwise_is_as_it_was_kept(name, other, kept):
     here, base = words(told(CASES[name][other]())), words(told_of(name))
     kept(f'{name}-{other.replace(" ", "_")}', here, base)
+
+
+def test_a_curve_is_recommended_by_what_falls(monkeypatch):
+    """The worst spot of all samples has the largest noise, and may stay where the whole gets better."""
+    case = nameless('angle')
+    for largest, words in (
+        (0.7e-3, 'the largest deviation goes from 0.900 mm to 0.700 mm.'),
+        (0.905e-3, 'the RMS goes from 0.400 mm to 0.300 mm.'),
+    ):
+        remaining = mending.Remaining(4e-4, 3e-4, 9e-4, largest)
+        monkeypatch.setattr(mending, 'remaining_without', lambda *_, kept=remaining: kept)
+        said = mending.look_at(case, 0)[-1].replace('\N{NO-BREAK SPACE}', ' ')
+        assert said.endswith(f'(weld-twin correct): {words}')

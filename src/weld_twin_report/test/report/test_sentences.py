@@ -23,6 +23,7 @@ from weld_twin_nodes.wording.quantities import (
 from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_nodes.wording.words import cause, in_words, listed
 from weld_twin_report.report import print_summary
+from weld_twin_report.report.diagnosis_page import _how_much
 
 
 def plain(text):
@@ -134,3 +135,12 @@ def test_what_remains_beside_a_name_is_not_told_as_above_the_noise_that_is_in_it
     told, _ = verdict(replace(case, status='unknown', gap=gap, unexplained=remains))
     words = '0.073 mm remains that no effect in the library explains; measuring noise alone is 0.041 mm'
     assert words in plain(told)
+
+
+def test_a_share_is_told_of_what_it_is_a_share_of():
+    """Frames fitted to other stretches may leave much more than the gap of all."""
+    found = diagnoses.backlash()
+    more = replace(found.shrink, rms_before_m=2.0 * found.gap.rms_m)
+    assert 'of the RMS gap, on data' in _how_much(found)
+    said = plain(_how_much(replace(found, shrink=more)))
+    assert f'of the {plain(millimetres(2.0 * found.gap.rms_m))} there, on data' in said

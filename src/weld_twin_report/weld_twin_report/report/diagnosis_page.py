@@ -22,6 +22,7 @@ from weld_twin_nodes.wording.mending import (
     switches,
 )
 from weld_twin_nodes.wording.quantities import (
+    STAYS,
     counted,
     millimetres,
     odds,
@@ -225,7 +226,15 @@ def _how_much(diagnosis: Diagnosis) -> str:
         return 'RMS on data not used for fitting; what was found turns the tool'
     with_what = '' if diagnosis.effects or switches(diagnosis) else ', and nothing to be entered'
     value, interval = shrink_ratio(shrink)
-    return f'RMS, {value} of the RMS gap, on data not used for fitting{with_what} ({interval})'
+    return f'RMS, {value} of {_whole(diagnosis)}, on data not used for fitting{with_what} ({interval})'
+
+
+def _whole(diagnosis: Diagnosis) -> str:
+    """Return what is left a share of: frames fitted to other stretches may leave more than the gap."""
+    before = diagnosis.shrink.rms_before_m
+    if STAYS * before <= diagnosis.gap.rms_m:
+        return 'the RMS gap'
+    return f'the {millimetres(before)} there'
 
 
 def _among(diagnosis: Diagnosis) -> str:

@@ -107,6 +107,8 @@ def _shares(
     steady: float,
 ) -> Array:
     """Return the steady share of every target that a group predicts at every ridge, shape (R, K)."""
+    if len(parts) < 2:  # one part does not show what is steady
+        return np.zeros((len(ridges), remaining.shape[1]))
     beside = group @ rest
     normal, pull = beside @ group.T, group @ remaining
     held = np.array(ridges)[:, None, None] * np.eye(len(group))
@@ -118,7 +120,7 @@ def _shares(
         after.append(((part.left - near @ x) ** 2).sum(axis=1))
     before = np.stack([(part.left**2).sum(axis=0) for part in parts])
     fall = before[:, None] - np.stack(after)
-    error = fall.std(axis=0, ddof=1) / np.sqrt(len(parts)) if len(parts) > 1 else np.inf
+    error = fall.std(axis=0, ddof=1) / np.sqrt(len(parts))
     sure = fall.mean(axis=0) >= steady * error
     return np.asarray(np.where(sure, fall.sum(axis=0) / before.sum(axis=0), 0.0))
 

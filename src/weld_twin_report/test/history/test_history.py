@@ -112,11 +112,11 @@ def test_a_knocked_tool_is_told_along_each_axis_in_its_unit():
     moved = (Moved('tool_pose 0', 2.1e-4, 6e-6), Moved('tool_pose 2', -2.3e-4, 8e-6))
     far = (Moved('tool_pose 1', 1e-6, 6e-6), Moved('tool_pose 4', 3e-3, 1e-4))
     told = Change(
-        *moved[0][:1], 'step', 20000.0, (19993.0, 20000.0), 2.1e-4, 6e-6, 50.0, ('tool *',)
+        *moved[0][:1], 'step', 20000.0, (19993.0, 20000.0), 2.1e-4, 6e-6, 50.0, ('base_pose *',)
     )
     assert sentence(replace(told, together=(*moved, *far))) == (
         'tool pose error: stepped by 0.2100 ± 0.0060 mm along x, −0.2300 ± 0.0080 mm along z, '
-        '3.00 ± 0.10 mrad about y between 2024-09-27 and 2024-10-04; as well it may be tool.'
+        '3.00 ± 0.10 mrad about y between 2024-09-27 and 2024-10-04; as well it may be base pose error.'
     )
 
 

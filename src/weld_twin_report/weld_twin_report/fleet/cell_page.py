@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.history import Observation
 from weld_twin_nodes.wording.quantities import counted, millimetres, odds
 from weld_twin_nodes.wording.words import capital
 
 from ..history.database import Damaged, Database
 from ..history.entry import Entry
 from ..history.runs import NEWEST, Run, Runs
-from ..history.words import HEADS, causes_of, coordinate, row
+from ..history.words import HEADS, causes_of, coordinate, moved, observations, row
 from ..report.charts import Axis, Line, chart
 from ..report.html import (
     Child,
@@ -141,15 +142,17 @@ def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> H
     charts: list[Child] = [
         control_chart('Gap', seconds, MILLI * gaps, Axis('gap', 'mm'), from_zero=True)
     ]
+    # What a change is of: tools counted from the first one.
+    seen = observations(entries)
     begins: dict[str, float] = {}
     for change in changes:
         day = datetime.fromisoformat(str(change['date'])).replace(tzinfo=timezone.utc)
-        name = str(change['coordinate'])
-        begins[name] = min(begins.get(name, np.inf), day.timestamp())
+        for name in moved(change):
+            begins[name] = min(begins.get(name, np.inf), day.timestamp())
     for name in _shown(entries, begins):
         what = coordinate(name)
         before = int(np.searchsorted(seconds, begins[name])) if name in begins else None
-        values = what.factor * np.array([_value(entry, name) for entry in entries])
+        values = what.factor * np.array([_value(each, name) for each in seen])
         axis = Axis('value', what.unit)
         charts.append(control_chart(capital(what.words), seconds, values, axis, before=before))
     lead = (
@@ -169,8 +172,8 @@ def _shown(entries: Sequence[Entry], begins: Mapping[str, float]) -> list[str]:
     return [name for name in dict.fromkeys([*begins, *named]) if name in known][:CHARTS]
 
 
-def _value(entry: Entry, name: str) -> float:
-    return float(entry.value[entry.names.index(name)]) if name in entry.names else np.nan
+def _value(each: Observation, name: str) -> float:
+    return float(each.value[each.names.index(name)]) if name in each.names else np.nan
 
 
 def troubles_section(troubles: Sequence[Run]) -> Html | None:

@@ -126,13 +126,12 @@ def coordinate(name: str) -> Coordinate:
     """Return what a coordinate is, such as 'tool.x' or 'joint_offset elbow_joint 0'."""
     effect, *joint, number = name.replace(_TOOL, 'tool_pose ').split(' ')
     if name.startswith(_TOOL):
-        factor, unit = display_unit(number, 'rad' if number.startswith('turn') else 'm')
+        axis, turns = number[-1], number.startswith('turn')
+        factor, unit = display_unit(number, 'rad' if turns else 'm')
         # A cell keeps no frames of its controller; the tool's own axes turn about themselves.
-        if number.startswith('turn'):
-            part = f'about {number[-1]}'
-            return Coordinate('tool_pose', None, f'turn of the tool {part}', factor, unit, part)
-        part = f"along {number} of the model's flange"
-        return Coordinate('tool_pose', None, f'tool {part}', factor, unit, part)
+        part = f'about {axis}' if turns else f'along {axis}'
+        words = f'turn of the tool {part}' if turns else f"tool {part} of the model's flange"
+        return Coordinate('tool_pose', None, words, factor, unit, part)
     kind = REGISTRY.get(effect)
     parameters = [p for p in kind.parameters if p.differentiable] if kind else []
     factor, unit, part = 1.0, '', f'part {int(number) + 1}'
@@ -151,7 +150,9 @@ def coordinate(name: str) -> Coordinate:
 
 def whole(name: str) -> str:
     """Return what a coordinate is a number of: its effect at its joint, or the tool."""
-    effect, *joint, _ = name.replace('.', ' ').split(' ')
+    if name.startswith((_TOOL, 'tool ')):
+        return "tool against the model's flange"
+    effect, *joint, _ = name.split(' ')
     return cause(effect, ' '.join(joint).partition('<')[0] or None)
 
 
@@ -253,6 +254,13 @@ def as_dict(change: Change) -> dict[str, Any]:
         'together': [each._asdict() for each in change.together],
         'sentence': sentence(change),
     }
+
+
+def moved(change: Mapping[str, Any]) -> list[str]:
+    """Return the coordinates that a change, as plain data, tells of, the surest first."""
+    several = [each for each in change.get('together') or () if abs(each['size']) > each['std']]
+    ranked = sorted(several, key=lambda each: -abs(each['size']) / each['std'])
+    return [str(each['name']) for each in ranked] or [str(change['coordinate'])]
 
 
 def since(result: Sequence[Change], day: float | None) -> list[Change]:

@@ -196,7 +196,18 @@ def _promises_are_kept(connection: Connection) -> None:
     """Version 3: what was measured after corrections has a table, which `schema` makes."""
 
 
-STEPS: tuple[Callable[[Connection], None], ...] = (_locks_are_no_refusals, _promises_are_kept)
+def _changes_are_looked_for_anew(connection: Connection) -> None:
+    """Version 4: a knock is one change, which what was found before did not know."""
+    from sqlalchemy import text
+
+    connection.execute(text('DELETE FROM findings'))
+
+
+STEPS: tuple[Callable[[Connection], None], ...] = (
+    _locks_are_no_refusals,
+    _promises_are_kept,
+    _changes_are_looked_for_anew,
+)
 """The step at place k makes version k + 2 of version k + 1."""
 
 

@@ -9,9 +9,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ...arrays import Array
 from .negligible import EMPTY, SLIGHT
@@ -60,6 +57,11 @@ def effective_share(
 
 def visited(q: Array) -> NDArray[np.intp]:
     """Return which station each of some postures (M, n) is, (M,)."""
+    # Nodes and motions do without these, and would start later for them.
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     one, other = cKDTree(q).query_pairs(SAME_STATION, p=np.inf, output_type='ndarray').T
     near = coo_matrix((np.ones(one.size), (one, other)), shape=2 * (len(q),))
     return np.asarray(connected_components(near, directed=False)[1], dtype=np.intp)

@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.errors import DataError
 from weld_twin_core.history import Observation, Outlook, changes, outlook, reaches
-from weld_twin_core.history.changes import series_of
+from weld_twin_core.history.series import series_of
 
 COUNT = 20
 NAMES = tuple(f'joint_offset joint_{k} 0' for k in range(COUNT))

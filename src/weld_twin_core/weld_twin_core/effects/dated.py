@@ -22,7 +22,6 @@ from ..recording import FIRST_DATE_NS, Recording
 from .effect import Effect, Hooked, LinearEffect, Traits, TwinHooks, register
 from .geometry import ChannelError, FrameError, JointOffset, ToolPose, frame_parameters
 from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
-from .wording import radians
 
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
@@ -110,12 +109,10 @@ class JointSlip(Sudden, ChannelError):
     since_then = JointOffset
 
     def remedy(self, robot: Robot) -> str:
-        at = robot.index(str(self.site))
-        size = self._plain('offset')
-        far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
         return (
-            f'See to the belt, coupling and encoder of {self.site}: it slipped by {far} at '
-            f't = {self._plain("time"):.4g}; then master it again.'
+            f'See to the belt, coupling and encoder of {self.site}: it slipped by '
+            f'{self._shifted(robot, self._plain("offset"))} at t = {self._plain("time"):.4g}; then '
+            'master it again.'
         )
 
 

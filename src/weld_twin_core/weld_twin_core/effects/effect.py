@@ -26,7 +26,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .hooks import OF_GROUP, TRAITS, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, gathered
 from .view import Parameter, Stage, Value, View
-from .wording import travel
+from .wording import metres, radians, travel
 
 __all__ = ['REGISTRY', 'Effect', 'FitHooks', 'Hooked', 'LinearEffect', 'MemoryEffect', 'Parameter']
 __all__ += ['SearchHooks', 'Stage', 'Traits', 'TwinHooks', 'Value', 'View', 'register']
@@ -345,6 +345,10 @@ class Effect(ABC):
     def _travelled(self, robot: Robot, value: float) -> str:
         """Return how far its joint moves, in mm where that slides, in degrees where it turns."""
         return travel(value, sliding=self.on_slide(robot))
+
+    def _shifted(self, robot: Robot, value: float) -> str:
+        """Return the same with its sign, of a joint that stands further on than it reads."""
+        return metres(value) if self.on_slide(robot) else radians(value)
 
     def _theta(self, view: View) -> Array:
         """Return the position of its joint, shape (..., N)."""

@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import DataError, ModelError
 from .effect import Effect, FitHooks, Hooked, LinearEffect, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
-from .wording import number, radians
+from .wording import number
 
 _REFERENCE = 20.0
 """Temperature [degC] at which the model holds unless something else is said, as lengths do (ISO 1)."""
@@ -295,15 +295,12 @@ class JointWarmUp(_WarmUp):
     )
 
     def _moved(self, view: View, size: Array) -> Shift:
-        return {('q', view.robot.index(self.joint)): size}
+        return self._moves(view, size)
 
     def remedy(self, robot: Robot) -> str:
-        at = robot.index(str(self.site))
-        size = self._plain('offset')
-        far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
         return (
             f'Warm {self.site} up before welding, or compensate its zero while it warms: it moves by '
-            f'{far}.'
+            f'{self._shifted(robot, self._plain("offset"))}.'
         )
 
 

@@ -55,17 +55,10 @@ __all__ += ['Hysteresis', 'InstrumentKnock', 'JointCompliance', 'JointCoupling',
 __all__ += ['JointOffset', 'JointSlip', 'LinearEffect', 'LinkLength', 'LinkOffset', 'LinkTwist']
 __all__ += ['JointWarmUp', 'LinkWarmUp', 'LoadedPlay', 'MeasurementNoise', 'MeasurementScale']
 __all__ += ['MemoryEffect', 'Parameter', 'Payload', 'PedestalTilt', 'Plausible', 'Quantization']
-__all__ += [
-    'Refraction',
-    'RootPose',
-    'ServoLag',
-    'SetupSettling',
-    'SetupStep',
-    'Stage',
-    'Stiffening',
-]
-__all__ += ['ThermalGrowth', 'TimeDelay', 'ToolPose', 'ToolSag', 'ToolSlip', 'TransmissionRipple']
-__all__ += ['Vibration', 'View', 'Wear', 'effect_from_mapping', 'effects_from_list', 'register']
+__all__ += ['Refraction', 'RootPose', 'ServoLag', 'SetupSettling', 'SetupStep', 'Stage']
+__all__ += ['Stiffening', 'ThermalGrowth', 'TimeDelay', 'ToolPose', 'ToolSag', 'ToolSlip']
+__all__ += ['TransmissionRipple', 'Vibration', 'View', 'Wear', 'effect_from_mapping']
+__all__ += ['effects_from_list', 'register']
 
 for _file in iter_modules(__path__):
     import_module(f'.{_file.name}', __name__)

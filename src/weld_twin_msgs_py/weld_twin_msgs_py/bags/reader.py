@@ -352,7 +352,7 @@ class BagReader:
     def _refuse_set_back(self, reader: Reader) -> None:
         """Refuse messages that are read in the order of a clock that was set back meanwhile."""
         for number, times in _as_written(reader.storage):
-            falls = np.maximum.accumulate(times) - times
+            falls = _falls(times)
             if falls.max(initial=0) > SET_BACK:
                 at = int(np.argmax(falls > SET_BACK))
                 names = [c.topic for c in reader.connections if c.id == number]
@@ -390,6 +390,11 @@ class BagReader:
         self._readers.append(self._stack.enter_context(Reader(file)))
 
 
+def _falls(times: IntArray) -> IntArray:
+    """Return by how much [ns] each time is before the latest of those before it."""
+    return np.maximum.accumulate(times) - times
+
+
 def _as_written(storage: Any) -> Iterator[tuple[int, IntArray]]:
     """Yield each connection and its times of recording [ns] as they were written, by the index alone."""
     if isinstance(storage, storage_mcap.McapReader) and storage.bio is not None:
@@ -408,7 +413,7 @@ def _as_written(storage: Any) -> Iterator[tuple[int, IntArray]]:
         np.int64,
     ).reshape(-1, 2)
     times = rows[np.argsort(rows[:, 1]), 0]
-    if (np.maximum.accumulate(times) - times).max(initial=0) > SET_BACK:
+    if _falls(times).max(initial=0) > SET_BACK:
         read = storage.dbconn.execute('SELECT topic_id, timestamp FROM messages ORDER BY id')
         rows = np.array(list(read), np.int64).reshape(-1, 2)
         yield from ((int(k), rows[rows[:, 0] == k, 1]) for k in np.unique(rows[:, 0]))

@@ -175,10 +175,11 @@ def _levelled(start: _Point, columns: Columns) -> _Point:
     An effect more starts as large as it is best with all others fitted anew. Beside the others as
     they were it makes all of it worse, and a frequency or a time constant would leap to make up for it.
     """
-    bent = ~np.concatenate([[True], *(effect.fit.straight() for effect in start.model.found)])[1:]
-    if not bent.any():
+    straight = [effect.fit.straight() for effect in start.model.found]
+    others = np.ones(start.x.size - sum(each.size for each in straight), dtype=bool)
+    held = ~np.concatenate([others, *straight])
+    if not held.any():
         return start
-    held = np.concatenate([np.zeros(start.x.size - bent.size, dtype=bool), bent])
     normal, right = start.normal_equations(columns)
     normal[held], normal[:, held], right[held] = 0.0, 0.0, 0.0
     there = start.stepped(solve_scaled(normal, right, DAMPING))

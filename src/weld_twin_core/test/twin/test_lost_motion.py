@@ -127,11 +127,6 @@ def test_a_fit_leaves_even_friction_even():
     assert even.errors(np.array([1e-5, 2e-5])) == {'windup': 1e-5, 'travel': 2e-5}
 
 
-def test_friction_is_nothing_to_stations(arm, make_recording):
-    recording = make_recording(arm, static=True)
-    assert not under(arm, Friction('j1', windup=1e-2), recording).any()
-
-
 def test_a_friction_that_pushes_is_refused(arm):
     for wrong in ({'windup': -1e-3}, {'windup': 1e-3, 'asymmetry': 0.9}):
         with pytest.raises(ModelError, match='outside'):

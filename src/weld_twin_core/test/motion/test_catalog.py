@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from drawn_robots import pinocchio_model
 from source_chains import CHAINS, chain_poses
 
 from weld_twin_core.arm import catalog
@@ -109,11 +110,8 @@ def test_ranges_and_speeds_of_an_arm_are_those_of_its_data_sheet_in_degrees():
     np.testing.assert_allclose(arm.max_velocity, speed, rtol=1e-15)
 
 
-def test_tool_pose_jacobian_and_gravity_are_those_of_pinocchio(
-    robot, pinocchio_model, configurations
-):
-    pin = pytest.importorskip('pinocchio')
-    model = pinocchio_model(robot.name)
+def test_tool_pose_jacobian_and_gravity_are_those_of_pinocchio(robot, configurations):
+    pin, model = pinocchio_model(robot)
     data, tip = model.createData(), model.getFrameId('tip')
     for q in configurations(robot):
         pin.framesForwardKinematics(model, data, q)

@@ -4,59 +4,20 @@
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from drawn_robots import random_robot
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Recording, Signal
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies beside the tests can be imported
-
-UR5_ROWS = [
-    (0.0, np.pi / 2, 0.089159),
-    (-0.425, 0.0, 0.0),
-    (-0.39225, 0.0, 0.0),
-    (0.0, np.pi / 2, 0.10915),
-    (0.0, -np.pi / 2, 0.09465),
-    (0.0, 0.0, 0.0823),
-]
-
-
-def random_robot(seed, n=6, convention='standard', slides=(), frames=True):
-    """Return a robot with every number drawn, and masses on all links."""
-    rng = np.random.default_rng(seed)
-
-    def frame():
-        quat = rng.normal(size=4)
-        return {'xyz': rng.normal(scale=0.3, size=3), 'quat_xyzw': quat / np.linalg.norm(quat)}
-
-    joints = [
-        {
-            'name': f'j{i}',
-            'a': rng.normal(scale=0.3),
-            'alpha': rng.uniform(-2, 2),
-            'd': rng.normal(scale=0.3),
-            'theta_offset': rng.uniform(-2, 2),
-            'beta': rng.uniform(-0.5, 0.5),
-            'type': 'prismatic' if i in slides else 'revolute',
-        }
-        for i in range(n)
-    ]
-    links = [{'mass': rng.uniform(1, 5), 'com': rng.normal(scale=0.1, size=3)} for _ in range(n)]
-    data = {
-        'name': f'random{seed}',
-        'convention': convention,
-        'joints': joints,
-        'links': links,
-        'payload': {'mass': 2.0, 'com': [0.02, -0.03, 0.1]},
-    }
-    if frames:
-        data |= {'base': frame(), 'tool': frame()}
-    return Robot.from_mapping(data)
 
 
 def random_cell(seed, convention='standard', slides=()):
@@ -72,31 +33,8 @@ def random_cell(seed, convention='standard', slides=()):
 KEPT = ('base', 'tool', 'joints', 'links', 'payload', 'convention')
 
 
-def ur5():
-    """Return a UR5 with link masses."""
-    masses = [3.7, 8.393, 2.33, 1.219, 1.219, 0.1879]
-    coms = [
-        (0, -0.02561, 0.00193),
-        (0.2125, 0, 0.11336),
-        (0.15, 0, 0.0265),
-        (0, -0.0018, 0.01634),
-        (0, 0.0018, 0.01634),
-        (0, 0, -0.001159),
-    ]
-    return Robot.from_mapping(
-        {
-            'name': 'ur5',
-            'joints': [
-                {'name': f'j{i}', 'a': a, 'alpha': alpha, 'd': d}
-                for i, (a, alpha, d) in enumerate(UR5_ROWS)
-            ],
-            'links': [{'mass': m, 'com': c} for m, c in zip(masses, coms, strict=True)],
-        }
-    )
-
-
 ROBOTS = {
-    'ur5': ur5(),
+    'ur5': replace(load('ur5'), joint_names=tuple(f'j{i}' for i in range(6))),
     'standard': random_robot(1),
     'modified': random_robot(2, convention='modified'),
     'seven joints': random_robot(3, n=7),

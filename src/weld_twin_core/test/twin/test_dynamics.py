@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from drawn_robots import pinocchio_model
 
 from weld_twin_core.arm import dynamics
 from weld_twin_core.arm.chain import frames
@@ -15,52 +16,6 @@ def positions(robot, count=4, seed=0):
     return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, robot.n))
 
 
-def add_branch(pin, model, robot, place, rows):
-    """Add rows from a place on what stands still; return the last joint, and the end in it."""
-
-    def turn(axis, angle):
-        return pin.SE3(pin.AngleAxis(angle, np.eye(3)['xyz'.index(axis)]).matrix(), np.zeros(3))
-
-    def slide(axis, length):
-        return pin.SE3(np.eye(3), length * np.eye(3)['xyz'.index(axis)])
-
-    parent, after = 0, pin.SE3(place)
-    for i in rows:
-        before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
-        fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
-        if robot.convention == 'standard':
-            at = after
-            fixed = (
-                fixed
-                * slide('x', robot.a[i])
-                * turn('x', robot.alpha[i])
-                * turn('y', robot.beta[i])
-            )
-        else:
-            at = after * before
-        joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
-        parent, after = model.addJoint(parent, joint, at, f'j{i}'), fixed
-        inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
-        model.appendBodyToJoint(parent, inertia, fixed)
-    return parent, after
-
-
-def pinocchio_model(pin, robot):
-    """Build the chain joint by joint: constant parts of a row go before or after its joint."""
-    model, k = pin.Model(), robot.behind
-    # A robot stands in the measuring frame; beside a positioner all stand in the robot's base.
-    base = np.eye(4) if k else robot.T_world_base
-    model.gravity = pin.Motion(base[:3, :3] @ robot.gravity, np.zeros(3))
-    if k:
-        foot = np.linalg.inv(robot.T_root_base)
-        add_branch(pin, model, robot, foot, range(k)[::-1])
-    parent, after = add_branch(pin, model, robot, base, range(k, robot.n))
-    tool = after * pin.SE3(robot.T_flange_tool)
-    payload = pin.Inertia(robot.payload_mass, robot.payload_com, np.zeros((3, 3)))
-    model.appendBodyToJoint(parent, payload, tool)
-    return model
-
-
 def in_order(robot, values):
     """Return values of joints in the order of the other library's tree: a positioner from its foot."""
     k = robot.behind
@@ -68,8 +23,7 @@ def in_order(robot, values):
 
 
 def test_gravity_torque_is_the_negative_of_pinocchios_generalised_gravity(robot):
-    pin = pytest.importorskip('pinocchio')
-    model = pinocchio_model(pin, robot)
+    pin, model = pinocchio_model(robot)
     data = model.createData()
     q = positions(robot)
     found = dynamics.gravity_torque(robot, q)

@@ -26,7 +26,6 @@ from weld_twin_core.sensitivity import (
     tolerances_from_list,
 )
 from weld_twin_core.sensitivity.evaluate import exact_deviations
-from weld_twin_core.sensitivity.expansion import remembered
 from weld_twin_core.sensitivity.seam_study import outcomes
 from weld_twin_core.sensitivity.trajectory_advice import rms_over_arc
 
@@ -116,25 +115,14 @@ def test_fast_model_agrees_with_the_exact_twin_run_by_run(study, families):
     assert fast.error < 1e-3
 
 
-@pytest.mark.parametrize('family', ['backlash', 'servo_lag', 'friction'])
-def test_what_a_joint_remembers_is_the_same_from_a_table_as_run_by_run(study, family):
-    tolerances = default_tolerances(study.robot, (family,))[:3]
-    joints = remembered(study, tolerances, np.array([t.distribution.std for t in tolerances]))
-    for joint in joints:
-        assert joint.table is None or joint.table[0].size < 500
-        draws = draws_at(tolerances, np.random.default_rng(2).random((200, len(tolerances))))
-        rest, where = joint.rest(draws)
-        found = np.zeros((200, study.samples))
-        found[:, where] = rest.of(slice(None))
-        np.testing.assert_allclose(found, joint.remainder(draws[:, joint.columns]), atol=3e-10)
-    # Draws beyond what the tolerances can be are run one by one.
-    beyond, where = joints[0].rest(100.0 + np.abs(draws))
-    assert beyond.rise is None
-
-
 def test_effects_the_expansion_cannot_carry_are_run_exactly(study):
     tolerances = default_tolerances(study.robot, ('transmission_ripple',))
     assert model(study, tolerances).expansion is None
+
+
+def test_tolerances_too_wide_for_the_expansion_are_run_exactly(study):
+    wide = default_tolerances(study.robot, ('joint_offset', 'link_length'), 300.0)
+    assert model(study, wide).expansion is None
 
 
 def test_fast_model_counts_from_the_known_effects(ur5, study):

@@ -12,9 +12,8 @@ part leaves is run exactly, joint by joint, and carried by the Jacobian.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -31,40 +30,6 @@ from .tolerance import Tolerance, with_draws
 MEMORY = (Stage.SERVO, Stage.PLAY)
 _NOTHING = 1e-15
 """Below this displacement [rad or m] nothing is left to carry."""
-_STRAIGHT = 1e-10
-"""How far [rad or m] a displacement may be from the straight line between two knots: at the end of
-an arm of a metre that is a tenth of a nanometre, a millionth of what play does there."""
-_COARSE = 64
-"""Even steps that a table begins with; each is halved where the displacement bends."""
-_HALVINGS = 24
-"""Halvings after which steps are below what is left of the numbers' precision."""
-_KNOTS = 4096
-"""Knots beyond which a table costs more than the draws it is for: a long recording of a joint
-that turns often bends at very many widths."""
-
-
-class Rest(NamedTuple):
-    """
-    What the slope leaves of the displacements by some draws, at the path points where it does.
-
-    ``table`` (B, K) holds it at some values, ``rise`` (B, K) how much the next value adds, or
-    None; a draw (D,) is the ``row`` and its ``part`` of the way to the next.
-    """
-
-    table: Array
-    rise: Array | None
-    row: NDArray[np.intp]
-    part: Array | None
-
-    def of(self, draws: slice) -> Array:
-        """Return the displacements of some of the draws, shape (D, K)."""
-        row = self.row[draws]
-        out = self.table[row]
-        if self.rise is not None and self.part is not None:
-            more = self.rise[row]
-            more *= self.part[draws, None]
-            out += more
-        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,83 +44,17 @@ class Remembered:
     slope: Array
     """Displacement per unit of each at its typical size, shape (M, N)."""
 
-    def remainder(self, own: Array) -> Array:
-        """Return what the slope leaves of the displacements by draws (D, M), shape (D, N)."""
-        out = _displacement(self.study, self.joint, self.tolerances, own)
-        out -= own @ self.slope
-        return out
+    def rest(self, draws: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+        """
+        Return what the slope leaves of draws (D, P) at the path points (K,) where it leaves anything.
 
-    @cached_property
-    def table(self) -> tuple[Array, Array] | None:
-        """Return the one tolerance's values (B,) and rests (B, N), straight between, if few bends do."""
-        if len(self.columns) != 1:
-            return None
-        ends = self.tolerances[0].distribution.values([0.0, 1.0])
-        return _straight_between(lambda x: self.remainder(x[:, None]), *ends)
-
-    def rest(self, draws: Array) -> tuple[Rest, NDArray[np.intp]]:
-        """Return what the slope leaves of draws (D, P), and at which path points (K,)."""
-        own = draws[:, self.columns]
-        if self.table is not None:
-            knots, one = self.table[0], own[:, 0]
-            if np.all((knots[0] <= one) & (one <= knots[-1])):
-                row = np.clip(np.searchsorted(knots, one, 'right') - 1, 0, knots.size - 2)
-                part = (one - knots[row]) / (knots[row + 1] - knots[row])
-                where, table, rise = self._where_any
-                return Rest(table, rise, row, part), where
-        different, row = _different(own)
-        remaining = self.remainder(different)
-        where = _somewhere(remaining)
-        return Rest(remaining[:, where], None, row, None), where
-
-    @cached_property
-    def _where_any(self) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return the path points where the table has anything, and the table and its rise there."""
-        assert self.table is not None
-        values = self.table[1]
-        where = _somewhere(values)
-        table = np.ascontiguousarray(values[:, where])
-        return where, table[:-1], np.diff(table, axis=0)
-
-
-def _somewhere(values: Array) -> NDArray[np.intp]:
-    """Return the columns of (B, N) that hold anything."""
-    return np.flatnonzero(np.abs(values).max(axis=0) > _NOTHING)
-
-
-def _straight_between(
-    function: Callable[[Array], Array], low: float, high: float
-) -> tuple[Array, Array] | None:
-    """Return knots (B,) and values (B, N), straight between to `_STRAIGHT`; None for too many."""
-    knots = np.linspace(low, high, _COARSE + 1)
-    values = function(knots)
-    first = np.arange(_COARSE)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (knots[first] + knots[first + 1])
-        between = function(middle)
-        off = np.abs(between - 0.5 * (values[first] + values[first + 1])).max(axis=1)
-        bent = off > _STRAIGHT
-        if not bent.any():
-            break
-        if knots.size + bent.sum() > _KNOTS:
-            return None
-        at = first[bent] + 1
-        knots = np.insert(knots, at, middle[bent])
-        values = np.insert(values, at, between[bent], axis=0)
-        # Both halves of a step that was halved are looked at again; all others are straight.
-        place = at - 1 + np.arange(at.size)
-        first = np.stack([place, place + 1], axis=1).ravel()
-    return _needed(knots, values)
-
-
-def _needed(knots: Array, values: Array) -> tuple[Array, Array]:
-    """Return the knots where something bends, and the two ends."""
-    inner = knots[1:-1]
-    part = ((inner - knots[:-2]) / (knots[2:] - knots[:-2]))[:, None]
-    line = values[:-2] + part * (values[2:] - values[:-2])
-    bends = np.abs(values[1:-1] - line).max(axis=1) > 0.01 * _STRAIGHT
-    keep = np.concatenate([[True], bends, [True]])
-    return knots[keep], values[keep]
+        Rows (B, K) of the draws that differ, which of them each draw is (D,), and the points.
+        """
+        different, row = _different(draws[:, self.columns])
+        remaining = _displacement(self.study, self.joint, self.tolerances, different)
+        remaining -= different @ self.slope
+        where = np.flatnonzero(np.abs(remaining).max(axis=0) > _NOTHING)
+        return remaining[:, where], row, where
 
 
 def _different(draws: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -257,19 +156,20 @@ class Expansion:
     def _remainder(self, draws: Array) -> _Remainder:
         """Return what the slopes leave, the path points where any joint has something put last."""
         result = [part.rest(draws) for part in self.memory]
+        places = [where for _, _, where in result]
         somewhere = np.zeros(self.study.samples, dtype=bool)
-        for _, where in result:
+        for where in places:
             somewhere[where] = True
         order = np.argsort(somewhere, kind='stable')
         place = np.argsort(order) - (self.study.samples - int(somewhere.sum()))
-        lever = np.zeros((3, sum(w.size for _, w in result), int(somewhere.sum())))
+        lever = np.zeros((3, sum(w.size for w in places), int(somewhere.sum())))
         start = 0
-        for (_, where), moved in zip(result, self.moved, strict=True):
+        for where, moved in zip(places, self.moved, strict=True):
             rows = np.arange(start, start + where.size)
             lever[:, rows, place[where]] = moved[:, where]
             start += where.size
         shapes = np.ascontiguousarray(self.shapes[:, :, order])
-        return _Remainder(order, shapes, [rest for rest, _ in result], lever)
+        return _Remainder(order, shapes, [(rest, row) for rest, row, _ in result], lever)
 
     def _deviations(self, draws: Array, remaining: _Remainder, chunk: slice) -> Array:
         x = np.ascontiguousarray((draws / self.scale).T)
@@ -277,7 +177,7 @@ class Expansion:
         features = np.concatenate([x, x[first] * x[second]])
         out: Array = (features.T @ self.weights) @ remaining.shapes
         if remaining.lever.size:
-            rests = np.concatenate([rest.of(chunk) for rest in remaining.rests], axis=1)
+            rests = np.concatenate([rest[row[chunk]] for rest, row in remaining.rests], axis=1)
             out[:, :, out.shape[2] - remaining.lever.shape[2] :] += rests @ remaining.lever
         return out
 
@@ -287,13 +187,13 @@ class _Remainder(NamedTuple):
     What the slopes leave of some draws.
 
     ``order`` of the path points (N,) puts those where anything is left last, K of them; ``shapes``
-    are in it. ``rests`` are displacements of the joints, S columns in all, and ``lever`` (3, S,
-    K) how far each moves the tool there.
+    are in it. ``rests`` are rows of displacements of a joint, and which of them each draw has; S columns
+    in all. ``lever`` (3, S, K) is how far each moves the tool there.
     """
 
     order: NDArray[np.intp]
     shapes: Array
-    rests: list[Rest]
+    rests: list[tuple[Array, NDArray[np.intp]]]
     lever: Array
 
 

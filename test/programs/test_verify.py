@@ -299,6 +299,8 @@ def test_a_plan_promises_in_a_region_what_the_diagnosis_warns_of(cell):
     said = plan_more(cell)
     assert said.code == 0, said.err
     assert f'be off by {posterior["sigma_anywhere_m"] * 1e3:.2g} mm elsewhere' in said.out
+    # What is left over is this arm's, read off its recordings, in the set-up of these.
+    assert 'as its kind' not in said.out and 'the set-up is as it was recorded' in said.out
     for region in (MADE / FILES[0], cell / 'before', BOX):
         said = plan_more(cell, '--region', region)
         assert said.code == 0, said.err

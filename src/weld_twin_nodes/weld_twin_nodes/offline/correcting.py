@@ -99,18 +99,23 @@ def program_model(
     """Return what a model file says acts on the arm of a program at a temperature [degC]."""
     if temperature is not None:
         checked_temperature(temperature)
+    model = replace(arm_model(robot, path, setup), temperature=temperature)
+    _refuse_by_effort(model.effects, path)
+    return model
+
+
+def arm_model(robot: Robot, path: Path | str, setup: int = 0) -> ProgramModel:
+    """Return what a model file says acts on an arm from now on, in the middle of what is allowed."""
     content = diagnosis_of(path)
-    if 'model' in content or content.get('unsound'):
-        placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
-        result, posterior = from_now_on(model.found), read_posterior(robot, path)
-        if posterior is not None:
-            result, posterior = posterior.of_the_arm().centred(result, setup)
-        effects = (*from_now_on(model.known), *result, *model.changed(setup))
-        _refuse_by_effort(effects, path)
-        return ProgramModel(placed, effects, posterior, temperature, setup)
-    twin = build_twin(robot, path, mended=True)
-    _refuse_by_effort(twin.effects, path)
-    return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
+    if 'model' not in content and not content.get('unsound'):
+        twin = build_twin(robot, path, mended=True)
+        return ProgramModel(twin.robot, tuple(twin.effects))
+    placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
+    result, posterior = from_now_on(model.found), read_posterior(robot, path)
+    if posterior is not None:
+        result, posterior = posterior.of_the_arm().centred(result, setup)
+    effects = (*from_now_on(model.known), *result, *model.changed(setup))
+    return ProgramModel(placed, effects, posterior, setup=setup)
 
 
 def _refuse_by_effort(effects: Sequence[Effect], path: Path | str) -> None:

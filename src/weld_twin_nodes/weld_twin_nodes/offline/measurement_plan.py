@@ -135,8 +135,8 @@ def _way(robot: Robot, q: Array) -> list[int]:
     return order
 
 
-def plan_table(plan: Planned, tolerance: float) -> list[str]:
-    """Return how sure so many poses make one, in lines; the tolerance is in metres."""
+def plan_table(plan: Planned, tolerance: float, *, diagnosed: bool = False) -> list[str]:
+    """Return how sure so many poses make one, of an arm diagnosed already or not; tolerance [m]."""
     wanted = f'{1e3 * tolerance:g} mm'
     most, count = len(plan.minutes) - 1, len(plan.q)
     steps = {0, *SHOWN, count, most}
@@ -148,16 +148,18 @@ def plan_table(plan: Planned, tolerance: float) -> list[str]:
     far = plan.elsewhere[count]
     beyond = f'may still be off by {far * 1e3:.2g} mm' if far < NOTHING_KNOWN else 'is not known'
     out.append(f'elsewhere in its reach the corrected robot {beyond} after {count} poses')
-    out.append(
-        'all this is of an arm as its kind usually is: one with rough gears keeps up to six times'
-    )
+    if not diagnosed:
+        out.append(
+            'all this is of an arm as its kind usually is: one with rough gears keeps up to six times'
+        )
     if plan.needed is None:
         out.append(
             f'all {most} poses that fit into the time keep {wanted} at {plan.within[-1]:.0%} of '
             'postures; more time, less noise or a smaller --spread help'
         )
         return out
-    out.append(f'{count} poses, {plan.minutes[count]:.0f} minutes: base and tool are found along')
+    set_up = 'the set-up is as it was recorded' if diagnosed else 'base and tool are found along'
+    out.append(f'{count} poses, {plan.minutes[count]:.0f} minutes: {set_up}')
     if plan.within[count] < SURE:
         out.append(
             f'{count} poses keep {wanted} at {plan.within[count]:.0%} of postures; more of them, '

@@ -42,6 +42,7 @@ from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.files.whole_files import write_text
 
+from .correcting import arm_model
 from .given_twin import build_twin, diagnosis_of
 
 BESIDE = 'prediction.json'
@@ -242,23 +243,26 @@ class Compensated(NamedTuple):
     came; empty where they are as recorded."""
 
 
-def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
-    """Return the commands for a model file, less corrected where the model knows less."""
-    content, twin = diagnosis_of(path), build_twin(robot, path, mended=True)
-    model = Predictor(twin, read_posterior(robot, path) if content else None)
-    stored = read_model(robot, path) if 'model' in content else None
+def compensated(
+    robot: Robot, path: Path | str, recording: Recording, setup: int = 0
+) -> Compensated:
+    """Return the commands for a set-up of a model file, less corrected where the model knows less."""
+    arm = arm_model(robot, path, setup)
+    twin, posterior = arm.twin(arm.robot.T_flange_tool, whole=True), arm.posterior
+    model = Predictor(twin, posterior, setup)
+    stored = read_model(robot, path) if 'model' in diagnosis_of(path) else None
     given, notes = recording, ''
     if stored is not None:
         # Its clocks are its own, and commands need none.
         recording, notes = mended_source(stored, robot, given, -1)
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     share = None
-    if model.posterior is not None:
-        about = pose_covariances(model.posterior, twin, recording, recording.joints.t)
-        share = model.posterior.domain.trust(
+    if posterior is not None:
+        about = pose_covariances(posterior, twin, recording, recording.joints.t, setup)
+        share = posterior.domain.trust(
             recording.joints.q, real.position - nominal.position, about[:, :3, :3]
         )
-    result = compensate(twin.robot, twin.effects, recording, trust=share)
+    result = compensate(twin.robot, arm.effects, recording, trust=share)
     least = 1.0 if share is None else float(share.min())
     motion = result.motion
     if stored is not None and recording is not given:

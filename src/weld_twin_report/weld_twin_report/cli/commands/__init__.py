@@ -33,7 +33,6 @@ of a program:
 rare:
 --noise LENGTH           of a coordinate of your instrument, for what to measure more (default:
                          0.03mm)
---setup N                which recording of the diagnosis (default: 1)
 """
 _DIAGNOSE = Command(
     """Say where the gap lies, what causes it, how far it shrinks.
@@ -137,6 +136,7 @@ _CORRECT = Command(
         options.ROBOT,
         '--model FILE             diagnosis.json, or an effects file',
         options.folder_output('directory of results; of a bag, the bag to write'),
+        'rare:\n--setup N                which recording of the diagnosis [default: 1]',
         OF_PROGRAM,
         options.PROGRAM,
         options.STORAGE,

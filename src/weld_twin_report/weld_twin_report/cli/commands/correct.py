@@ -91,8 +91,10 @@ def _corrected_bag(given: Given) -> int:
     robot = given.load_robot()
     robot.refuse_positioner('a compensated motion')
     recording = given.read_bag(given.program, robot)
-    made = prediction.compensated(robot, given.model, recording)
-    say_doubts(robot, made.model.twin.effects, given.model, given.robot)
+    made = prediction.compensated(robot, given.model, recording, given.setup - 1)
+    # What a posterior leaves open lies on both sides of zero.
+    doubted = made.model.twin.effects if made.model.posterior is None else ()
+    say_doubts(robot, doubted, given.model, given.robot)
     if made.remark:
         print(f'note: {made.remark}')
     robot.check_positions(made.result.motion.q)
@@ -141,8 +143,7 @@ def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs)
     robot = context.robot
     length, angle = given.max_correction or LARGEST
     caps = Caps(_length(length, CAPS), quantity(angle, ('deg', 'rad'), CAPS))
-    setup = 0 if given.setup is None else given.setup - 1
-    model = correcting.program_model(robot, given.model, given.temperature, setup)
+    model = correcting.program_model(robot, given.model, given.temperature, given.setup - 1)
     if model.posterior is None:  # what a posterior leaves open lies on both sides of zero
         say_doubts(robot, model.effects, given.model)
     content = diagnosis_of(given.model)

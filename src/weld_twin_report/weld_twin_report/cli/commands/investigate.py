@@ -85,7 +85,7 @@ def _planned(given: Given) -> int:
     language, model = given.controller or 'csv', given.model if given.controller else None
     context = given.program_context(robot, language, model) if given.out else None
     plan = (_more if given.model else _first)(given, robot, tolerance)
-    print('\n'.join(plan_table(plan, tolerance)))
+    print('\n'.join(plan_table(plan, tolerance, diagnosed=bool(given.model))))
     if not given.controller:  # its program says so
         print(*(f'note: {note}\n' for note in without_limits(robot)), sep='', end='')
     if context is not None:

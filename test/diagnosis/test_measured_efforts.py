@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Springs driven by the measured effort of the joints; MuJoCo says what the joints bear."""
+"""Springs by measured efforts, and where soft springs rest."""
 
 import json
 from dataclasses import replace
@@ -11,8 +11,9 @@ from command_line import done, refused
 from diagnosis_cells import all_but
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.diagnosis.soundness.mending import Given, joints_as
-from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects import JointCompliance, Payload, effects_from_list
 from weld_twin_core.recording import JointSignal
 from weld_twin_lab.plant.compliance import Compliant
 from weld_twin_lab.plant.exponentials import Command, arm_from
@@ -165,3 +166,52 @@ def test_efforts_go_with_joints_that_are_put_right():
     given = joints_as(Given((recording,), ROBOT), matrix, np.zeros(6))
     got, was = given.recordings[0].effort.value, recording.effort.value
     np.testing.assert_allclose(got, was[:, [0, 2, 1, 3, 4, 5]] * (1, 1, 1, 1, -1, 1))
+
+
+ARM = load('ur10')
+SPRINGS = dict(zip(ARM.joint_names[1:5], (4e-5, 6e-5, 2e-4, 2e-4), strict=True))
+
+
+@pytest.fixture
+def stations():
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-1.5, 1.5, (30, 6)) + [0.0, -1.2, 1.0, 0.0, 0.0, 0.0]
+    return Recording('stations', JointMotion(np.arange(30.0), q, static=True))
+
+
+def test_twin_and_plant_agree_on_where_soft_springs_rest(stations):
+    causes = [
+        {'effect': 'joint_compliance', 'joint': joint, 'compliance': value}
+        for joint, value in SPRINGS.items()
+    ]
+    causes.append({'effect': 'payload', 'mass': 4.0, 'com': [0.02, 0.0, 0.1]})
+    command = Command(stations.joints.t, stations.joints.q, static=True)
+    plant = run(ARM.to_mapping(), causes, command, Tracker(), np.random.default_rng(0), 0.0)
+    springs = [JointCompliance(joint, value) for joint, value in SPRINGS.items()]
+    effects = [*springs, Payload(4.0, (0.02, 0.0, 0.1))]
+    rigid = Twin(ARM).poses(stations).position
+    sag = np.linalg.norm(plant.position - rigid, axis=1)
+    left = np.linalg.norm(plant.position - Twin(ARM, effects).poses(stations).position, axis=1)
+    assert sag.max() > 5e-3
+    assert left.max() < 2e-8  # the plant's springs stop after four rounds
+    plain = [
+        JointCompliance(joint, value, statics='first_order') for joint, value in SPRINGS.items()
+    ]
+    left = plant.position - Twin(ARM, [*plain, effects[-1]]).poses(stations).position
+    assert np.linalg.norm(left, axis=1).max() > 1e-5
+
+
+@pytest.mark.parametrize('statics', [None, 'equilibrium'])
+def test_a_diagnosis_is_replayed_with_the_springs_it_was_made_with(stations, tmp_path, statics):
+    frame = np.eye(4).tolist()
+    found = [{'effect': 'joint_compliance', 'joint': 'elbow_joint', 'compliance': 6e-5}]
+    model = {'kinematics': fingerprint(ARM), 'tool': frame, 'bases': [frame], 'found': found}
+    if statics:
+        model['statics'] = statics
+    path = tmp_path / 'diagnosis.json'
+    path.write_text(json.dumps({'schema': 'weld_twin/diagnosis/1', 'model': model}))
+    spring = JointCompliance('elbow_joint', 6e-5, statics=statics or 'first_order')
+    bare = ARM.with_frames(base=np.eye(4), tool=np.eye(4))
+    expected = Twin(bare, [spring]).poses(stations).position
+    got = load_model(ARM, path).poses(stations).position
+    assert np.abs(got - expected).max() < 1e-12

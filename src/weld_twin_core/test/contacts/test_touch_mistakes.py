@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Postures that are not what they are called: told of, and not fitted."""
+"""Touches: the next ones proposed, and mistakes in them."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
+from weld_twin_core.arm.chain import forward
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
+from weld_twin_core.diagnosis.advice.next_touches import (
+    Design,
+    again,
+    chosen,
+    next_touches,
+    scatter,
+)
+from weld_twin_core.diagnosis.algebra.motions import plain_causes
+from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness.touches import _loose, touches
 from weld_twin_core.diagnosis.unseen.groups import all_groups
@@ -62,24 +72,21 @@ def test_a_posture_in_the_other_socket_is_named_and_not_fitted(sound, robot):
     assert sum(found.problem.samples) == 3 * EACH - 1
 
 
-def test_a_slip_is_named_and_not_fitted(sound, robot):
+@pytest.mark.parametrize(
+    ('moved', 'joint', 'step', 'begin', 'end', 'lost'),
+    [
+        (slice(30, 31), 1, 0.02, "Posture 3 of 'c' is ", 'off: the contact slipped.', 1),
+        (slice(36, None), 0, 0.01, "Postures 9 to 14 of 'c' rest ", 'while it was measured', 0),
+    ],
+)
+def test_a_slip_is_not_fitted_and_a_place_that_was_moved_counts_as_two(
+    sound, robot, moved, joint, step, begin, end, lost
+):
     q = np.array(sound.joints.q)
-    q[30, 1] += 0.02
-    found, mended, _ = told(replace(sound, joints=replace(sound.joints, q=q)), robot)
-    assert len(mended) == 1
-    assert mended[0].startswith("Posture 3 of 'c' is ")
-    assert mended[0].endswith('off: the contact slipped.')
-    assert sum(found.problem.samples) == 3 * EACH - 1
-
-
-def test_a_place_that_was_moved_counts_as_two(sound, robot):
-    q = np.array(sound.joints.q)
-    q[36:, 0] += 0.01
-    found, mended, _ = told(replace(sound, joints=replace(sound.joints, q=q)), robot)
-    assert len(mended) == 1
-    assert mended[0].startswith("Postures 9 to 14 of 'c' rest ")
-    assert 'its place was moved while it was measured' in mended[0]
-    assert sum(found.problem.samples) == 3 * EACH
+    q[moved, joint] += step
+    found, (mended,), _ = told(replace(sound, joints=replace(sound.joints, q=q)), robot)
+    assert mended.startswith(begin) and end in mended
+    assert sum(found.problem.samples) == 3 * EACH - lost
 
 
 def test_swapped_files_are_not_mended(sound, robot):
@@ -103,3 +110,81 @@ def test_contacts_have_no_instrument_that_could_be_at_fault(sound, robot):
     places = {group.at for group in all_groups(problem, model, scale)}
     assert places >= set(robot.joint_names[1:-1])
     assert 'instrument' not in places
+
+
+PLACES = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
+SIGMA = 1e-4
+TOUCHES = 8
+
+
+def touched(robot, labels, rng):
+    """Return touches of some places in postures that look much alike."""
+    q, names = [], []
+    for label in labels:
+        start = np.array([0.2, -1.0, 1.4, -1.9, -1.5, 0.0]) + rng.normal(0.0, 0.25, (40, 6))
+        found, good = reaching(robot, np.tile(PLACES[label], (40, 1)), start)
+        q.append(found[good][:TOUCHES])
+        names += [label] * len(q[-1])
+    every = np.concatenate(q)
+    motion = wt.JointMotion(np.arange(float(len(every))), every, static=True)
+    artefact = Artefact(tuple(Contact(label) for label in labels))
+    recording = wt.Recording('touches', motion, contacts=Contacts(artefact, tuple(names)))
+    problem, model = aligned(recording, robot, '', ())
+    return problem, model, Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
+
+
+def test_three_places_are_touched_again_where_they_are(robot):
+    problem, model, scale = touched(robot, PLACES, np.random.default_rng(3))
+    motion = next_touches(problem, model, (), scale)['motion']
+    q = np.array(motion['q'])
+    assert len(q) == len(motion['contact']) == 12
+    where = np.array([PLACES.get(label, [np.nan] * 3) for label in motion['contact']])
+    np.testing.assert_allclose(forward(robot, q)[:, :3, 3], where, atol=1e-6)
+    assert ((q >= robot.lower) & (q <= robot.upper)).all()
+
+
+def test_of_two_places_the_next_is_a_third_one(robot):
+    problem, model, scale = touched(robot, ['low', 'left'], np.random.default_rng(3))
+    wanted = next_touches(problem, model, (), scale)
+    assert set(wanted['motion']['contact']) == {'new place'}
+    points = forward(robot, np.array(wanted['motion']['q']))[:, :3, 3]
+    assert np.ptp(points, axis=0).max() < 1e-6
+    for label in ('low', 'left'):
+        assert np.linalg.norm(points[0] - PLACES[label]) > 0.2
+
+
+def test_explanations_that_a_pin_does_not_part_are_parted_by_the_postures_proposed(robot):
+    """The sizes that differ stand out by what is told once the postures are measured too."""
+    problem, model, scale = touched(robot, PLACES, np.random.default_rng(3))
+    one = (wt.effects.JointOffset('elbow_joint', offset=3e-3),)
+    other = (wt.effects.LinkLength('elbow_joint', da=1e-3),)
+    apart = next_touches(problem, model, (one, other), scale)
+    alike = next_touches(problem, model, (), scale)
+    assert apart['expected_separation_sigma'] > 1.0
+    assert alike['expected_separation_sigma'] is None
+    assert apart['motion']['q'] != alike['motion']['q']
+
+
+def test_touches_fitted_without_any_rest_are_no_reason_to_fail(robot):
+    problem, model, _ = touched(robot, PLACES, np.random.default_rng(3))
+    exact = Scale(1e-9, 1.0, tuple(np.ones(m) for m in problem.samples))
+    assert len(next_touches(problem, model, (), exact)['motion']['q']) == 12
+
+
+def test_what_is_foreseen_is_what_least_squares_give(robot):
+    """The spread left after some touches against the normal equations of all of them."""
+    problem, model, scale = touched(robot, PLACES, np.random.default_rng(3))
+    effects = plain_causes(robot, problem.features(model)[0].view, ('constant',))
+    design = Design.of(problem, model, effects, scale)
+    touches = [design.touchable(k, recording) for k, recording in again(problem, model)]
+    rows = np.concatenate([each.rows for each in touches])
+    order, after = chosen(design, rows, scatter(touches, design.errors), 5)
+    taken = rows[order].reshape(-1, rows.shape[2])
+
+    expected = np.linalg.inv(np.linalg.inv(design.root @ design.root.T) + taken.T @ taken)
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        after[-1].root @ after[-1].root.T / np.outer(size, size),
+        expected / np.outer(size, size),
+        atol=1e-4,
+    )

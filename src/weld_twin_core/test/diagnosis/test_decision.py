@@ -71,90 +71,122 @@ def structured(left, *candidate_sets, **changes):
 SURE = candidate_set((PLAY, 1.0))
 
 
-# Who is named -----------------------------------------------------------------------------------
+# Who is named, and what is none --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ('probability', 'status', 'named'),
-    [(0.85, 'identified', (PLAY,)), (0.84, 'ambiguous', (PLAY, OFFSET))],
-)
-def test_a_leader_is_named_alone_from_85_percent_on(probability, status, named):
-    verdict = decide(evidence(candidate_set((PLAY, probability), (OFFSET, 1.0 - probability))))
-    assert (verdict.status, verdict.sets) == (status, (named,))
+def above(times, **changes):
+    """Return evidence of a gap of so many floors of which nothing is explained."""
+    return evidence(gap=times * FLOOR, after=times * FLOOR, **changes)
 
 
-@pytest.mark.parametrize(('probability', 'listed'), [(0.031, True), (0.03, True), (0.029, False)])
-def test_an_alternative_is_named_beside_an_unsure_leader_from_3_percent_on(probability, listed):
-    verdict = decide(evidence(candidate_set((PLAY, 0.7), (OFFSET, 0.25), (DRIFT, probability))))
-    assert (DRIFT in verdict.sets[0]) is listed
+def led(*probabilities):
+    return evidence(candidate_set(*zip((PLAY, OFFSET, DRIFT), probabilities, strict=False)))
 
 
-def test_a_set_begins_with_the_effect_of_fewest_numbers():
-    base = Site('base_pose', None)
-    assert decide(evidence(candidate_set((base, 0.7), (OFFSET, 0.3)))).sets == ((OFFSET, base),)
+def with_strays(times, **changes):
+    """Return the same of readings without ten that stand out."""
+    stand_out = tuple(str(k) for k in range(11, 21))
+    return above(times, strays=stand_out, with_strays=2.5 * FLOOR, **changes)
 
 
-def test_what_cannot_be_told_apart_is_said_in_words():
-    verdict = decide(evidence(SURE, candidate_set((OFFSET, 0.5), (GEAR, 0.5))))
-    assert len(verdict.reasons) == 1
-    assert 'joint_offset of wrist_1_joint, gear_ratio of wrist_1_joint' in verdict.reasons[0]
+def less_what_is_left(part, after):
+    """
+    Return a gap of 1 mm with noise of 0.3 mm: 0.68 mm leave about half of the square to the name.
+
+    That is so by whatever its part is told.
+    """
+    return evidence(SURE, gap=1e-3, after=after, floor=0.3e-3, parts=(part,))
 
 
-def test_where_all_is_told_apart_no_reason_is_given():
-    assert decide(evidence(SURE)).reasons == ()
+def found_beside(left):
+    sizes = {'parts': (0.01, 0.5), 'gap': 0.6e-3, 'after': 0.55e-3}
+    return structured(left, SURE, OPEN, **sizes)
+
+
+BASE, OPEN = Site('base_pose', None), candidate_set((OFFSET, 0.5), (GEAR, 0.5))
+PAIR, DOUBTED = (SURE, candidate_set((OFFSET, 1.0))), candidate_set((PLAY, 0.99))
+MASS = 'payload with mass -10.5 kg'
+STRAYS = 'those at 11, 12, 13, 14, 15, 16, 17, 18 and 2 others do'
+ONE, UNSAID = ((PLAY,),), {'independent': False}
+PARTED = {'believed': (0.9, 0.2), 'parts': (0.9, 0.1)}
+VERDICTS = {
+    'a leader is named alone from 85 percent on': (led(0.85, 0.15), 'identified', ONE, None),
+    'before, it is not': (led(0.84, 0.16), 'ambiguous', ((PLAY, OFFSET),), 'backlash of elbow'),
+    'an alternative is named from 3 percent on': (
+        led(0.7, 0.25, 0.03), 'ambiguous', ((PLAY, OFFSET, DRIFT),), ''),
+    'before, it is none': (led(0.7, 0.25, 0.029), 'ambiguous', ((PLAY, OFFSET),), ''),
+    'a set begins with the effect of fewest numbers': (
+        evidence(candidate_set((BASE, 0.7), (OFFSET, 0.3))), 'ambiguous', ((OFFSET, BASE),), ''),
+    'what cannot be told apart is said': (
+        evidence(SURE, OPEN), 'ambiguous', ((PLAY,), (OFFSET, GEAR)),
+        'joint_offset of wrist_1_joint, gear_ratio of wrist_1_joint'),
+    'a name counts that is likelier right than wrong': (
+        evidence(SURE, believed=(0.51,)), 'identified', ONE, None),
+    'as likely is not enough': (evidence(SURE, believed=(0.5,)), 'unknown', (), ''),
+    'unlikely names that explain less': (
+        evidence(*PAIR, believed=(0.9, 0.2), parts=(0.6, 0.4)), 'identified', ONE, ''),
+    'unlikely names that explain more': (
+        evidence(*PAIR, believed=(0.9, 0.2), parts=(0.4, 0.6)), 'unknown', ONE, str(OFFSET)),
+    'a cause without a name as likely as not': (
+        evidence(*PAIR, **PARTED, nameless=0.5), 'identified', ONE, ''),
+    'a cause without a name likelier than not': (
+        evidence(*PAIR, **PARTED, nameless=0.51), 'unknown', ONE, ''),
+    'as likely as not beside one name': (evidence(SURE, nameless=0.5), 'identified', ONE, None),
+    'likelier than not beside one name': (
+        evidence(SURE, nameless=0.51), 'unknown', ONE, 'not in the library'),
+    **{f'after {after}, part {part}': (less_what_is_left(part, after), status, ONE, '')
+       for after, status in ((0.65e-3, 'identified'), (0.75e-3, 'unknown')) for part in (1.0, 0.3, 3.0)},
+    'what is found stays told beside what is left': (
+        found_beside(0.6), 'unknown', ((PLAY,), (OFFSET, GEAR)), ''),
+    'beside all that is left, too': (found_beside(0.9), 'unknown', ((PLAY,), (OFFSET, GEAR)), ''),
+    'what no machine has': (
+        evidence(DOUBTED, refused=(MASS,), believed=(0.3,)), 'unknown', (), (MASS, str(PLAY))),
+    'what no machine has alone': (evidence(refused=(MASS,)), 'unknown', (), ''),
+    'what was taken out': (
+        evidence(DOUBTED, lacking=('friction of elbow',), believed=(0.3,)), 'unknown', (),
+        ('friction of elbow', str(PLAY))),
+    'without an effect a twentieth may be left': (structured(0.049), 'none', (), ''),
+    'more than a twentieth may not': (structured(0.051), 'unknown', (), ''),
+    'what depends on nothing looked at': (above(2.0), 'unknown', (), 'something not looked at'),
+    'nothing found and nothing left': (
+        evidence(gap=FLOOR), 'none', (), 'there is no gap above the noise'),
+    'a gap above an independent floor': (above(1.31), 'unknown', (), ''),
+    'a gap within what such a floor may be off': (
+        above(1.29), 'none', (), 'no gap above the noise'),
+    'poses are to be repeated where nothing shows the noise': (
+        above(1.31, **UNSAID), 'none', (), 'repeat some poses'),
+    'little more than what the fit leaves': (
+        above(1.29, **UNSAID), 'none', (), 'no gap above the noise'),
+    'spread as noise may be': (above(1.68, **UNSAID), 'none', (), 'repeat some poses'),
+    'spread far wider than noise': (above(1.7, **UNSAID), 'unknown', (), 'far wider'),
+    'readings that stand out of noise': (with_strays(1.29), 'none', (), STRAYS),
+    'readings that stand out of what may be noise': (
+        with_strays(1.29, **UNSAID), 'none', (), STRAYS),
+    'readings that stand out of a gap': (with_strays(1.31), 'unknown', (), 'what remains depends'),
+    'readings that stand out of who knows what': (
+        with_strays(1.31, **UNSAID), 'none', (), 'repeat some poses'),
+    'readings that stand out hide no structure': (
+        structured(0.5, gap=1e-4, strays=('station 4',), with_strays=1e-3), 'unknown', (), ''),
+}  # fmt: skip
+"""Evidence, the status and sets it comes to, and words of the first reason and the last, if any."""
+
+
+@pytest.mark.parametrize('name', VERDICTS)
+def test_a_verdict_is_what_its_evidence_comes_to(name):
+    told, status, sets, words = VERDICTS[name]
+    verdict = decide(told)
+    assert (verdict.status, verdict.sets) == (status, sets)
+    if words is None:
+        assert verdict.reasons == ()
+    elif words:
+        first, last = words if isinstance(words, tuple) else (words, words)
+        assert first in verdict.reasons[0] and last in verdict.reasons[-1]
 
 
 def test_beliefs_that_are_given_decide():
     told = evidence(candidate_set((PLAY, 0.9), (OFFSET, 0.1)))
     assert decide(told).status == 'identified'
     assert decide(told, Beliefs(sure=0.95)).status == 'ambiguous'
-
-
-@pytest.mark.parametrize(('errors', 'structured'), [(2.9, False), (3.1, True)])
-def test_a_structure_counts_from_three_standard_errors_on(errors, structured):
-    told = evidence(SURE, structure=left_over(0.08, errors))
-    assert Left(told, Beliefs()).structured == structured
-
-
-# Named, or without a name -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(('believed', 'status'), [(0.51, 'identified'), (0.5, 'unknown')])
-def test_a_name_counts_that_is_likelier_right_than_wrong(believed, status):
-    verdict = decide(evidence(SURE, believed=(believed,)))
-    assert verdict.status == status
-    assert verdict.sets == (((PLAY,),) if status == 'identified' else ())
-
-
-@pytest.mark.parametrize(
-    ('parts', 'status'), [((0.6, 0.4), 'identified'), ((0.4, 0.6), 'unknown')]
-)
-def test_unlikely_names_make_a_gap_unknown_where_they_explain_more_than_the_others(parts, status):
-    pair = SURE, candidate_set((OFFSET, 1.0))
-    verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=parts))
-    assert verdict.status == status
-    assert verdict.sets == ((PLAY,),)
-    assert status == 'identified' or str(OFFSET) in verdict.reasons[-1]
-
-
-@pytest.mark.parametrize(('nameless', 'status'), [(0.5, 'identified'), (0.51, 'unknown')])
-def test_a_gap_is_unknown_where_a_cause_without_a_name_is_likelier_than_not(nameless, status):
-    pair = SURE, candidate_set((OFFSET, 1.0))
-    verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=(0.9, 0.1), nameless=nameless))
-    assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
-    alone = decide(evidence(SURE, nameless=nameless))
-    assert (alone.status, alone.sets) == (status, ((PLAY,),))
-    assert status == 'identified' or 'not in the library' in alone.reasons[0]
-
-
-@pytest.mark.parametrize('part', [1.0, 0.3, 3.0])
-def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named(part):
-    # A gap of 1 mm and noise of 0.3 mm; 0.68 mm leave about half of the square to the name, by
-    # whatever its part is told.
-    for after, status in ((0.65e-3, 'identified'), (0.75e-3, 'unknown')):
-        told = evidence(SURE, gap=1e-3, after=after, floor=0.3e-3, parts=(part,))
-        verdict = decide(told)
-        assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
 
 
 @pytest.mark.parametrize(
@@ -181,35 +213,6 @@ def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motio
     verdict = decide(evidence(gap=FLOOR, scattered=(Scatter(joint, 0.2, 6.0),)))
     assert (verdict.status, verdict.sets) == ('unknown', ())
     assert '20 % of it lies along the motion of' in verdict.reasons[0]
-
-
-@pytest.mark.parametrize('left', [0.6, 0.9])
-def test_what_is_found_stays_told_beside_what_is_left(left):
-    pair = candidate_set((OFFSET, 0.5), (GEAR, 0.5))
-    told = structured(left, SURE, pair, parts=(0.01, 0.5), gap=0.6e-3, after=0.55e-3)
-    verdict = decide(told)
-    assert verdict.status == 'unknown'
-    assert verdict.sets == ((PLAY,), (OFFSET, GEAR))
-
-
-def test_what_no_machine_has_or_was_taken_out_is_told_first_of_what_is_unknown():
-    mass = 'payload with mass -10.5 kg'
-    verdict = decide(evidence(candidate_set((PLAY, 0.99)), refused=(mass,), believed=(0.3,)))
-    assert (verdict.status, verdict.sets) == ('unknown', ())
-    assert mass in verdict.reasons[0]
-    assert decide(evidence(refused=(mass,))).status == 'unknown'
-    lacking = evidence(
-        candidate_set((PLAY, 0.99)), lacking=('friction of elbow',), believed=(0.3,)
-    )
-    assert 'friction of elbow' in decide(lacking).reasons[0]
-
-
-@pytest.mark.parametrize(('left', 'status'), [(0.049, 'none'), (0.051, 'unknown')])
-def test_without_an_effect_a_twentieth_may_stay_unexplained(left, status):
-    assert decide(structured(left)).status == status
-
-
-# Why not to believe what fits -------------------------------------------------------------------
 
 
 def test_the_number_of_causes_alone_says_nothing_against_them():
@@ -278,65 +281,6 @@ def test_without_gap_and_floor_a_nanometre_is_divided_by():
     told = evidence(after=0.5e-9, floor=0.0, gap=0.0, independent=False)
     found = replace(told, structure=left_over(0.2), independent=True)
     assert Left(found, Beliefs()).share == pytest.approx(0.25)
-
-
-def test_what_depends_on_nothing_looked_at_is_said_so():
-    told = evidence(gap=2.0 * FLOOR, after=2.0 * FLOOR)
-    assert 'something not looked at' in decide(told).reasons[0]
-
-
-# Nothing found ----------------------------------------------------------------------------------
-
-
-def test_nothing_found_and_nothing_left_is_none():
-    verdict = decide(evidence(gap=FLOOR))
-    assert (verdict.status, verdict.sets) == ('none', ())
-    assert verdict.reasons == ('there is no gap above the noise',)
-
-
-@pytest.mark.parametrize(('times', 'status'), [(1.31, 'unknown'), (1.29, 'none')])
-def test_a_gap_above_an_independent_floor_is_unknown(times, status):
-    assert decide(evidence(gap=times * FLOOR, after=times * FLOOR)).status == status
-
-
-@pytest.mark.parametrize(('times', 'asked'), [(1.31, True), (1.29, False)])
-def test_where_nothing_shows_the_noise_poses_are_to_be_repeated(times, asked):
-    told = evidence(gap=times * FLOOR, after=times * FLOOR, independent=False)
-    verdict = decide(told)
-    assert verdict.status == 'none'
-    assert ('repeat some poses' in verdict.reasons[0]) is asked
-
-
-@pytest.mark.parametrize(('times', 'status'), [(1.68, 'none'), (1.7, 'unknown')])
-def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
-    told = evidence(gap=times * FLOOR, after=times * FLOOR, independent=False)
-    verdict = decide(told)
-    assert verdict.status == status
-    assert ('far wider' in verdict.reasons[0]) is (status == 'unknown')
-
-
-@pytest.mark.parametrize(
-    ('kept', 'independent', 'status', 'because'),
-    [
-        (1.29, True, 'none', 'those at 11, 12, 13, 14, 15, 16, 17, 18 and 2 others do'),
-        (1.29, False, 'none', 'those at 11, 12, 13, 14, 15, 16, 17, 18 and 2 others do'),
-        (1.31, True, 'unknown', 'what remains depends'),
-        (1.31, False, 'none', 'repeat some poses'),
-    ],
-)
-def test_readings_that_stand_out_are_no_gap_where_noise_is_left_without_them(
-    kept, independent, status, because
-):
-    own = evidence(gap=kept * FLOOR, after=kept * FLOOR, independent=independent)
-    strays = tuple(str(k) for k in range(11, 21))
-    verdict = decide(replace(own, strays=strays, with_strays=2.5 * FLOOR))
-    assert verdict.status == status
-    assert because in verdict.reasons[0]
-
-
-def test_readings_that_stand_out_hide_no_structure():
-    told = structured(0.5, gap=1e-4, strays=('station 4',), with_strays=1e-3)
-    assert decide(told).status == 'unknown'
 
 
 # Many small errors ------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics: closure, completeness, one branch along a path, and refusals."""
+"""Inverse kinematics against forward kinematics: poses, paths, and what is followed."""
 
 import re
 from dataclasses import replace
@@ -16,7 +16,8 @@ from weld_twin_core.arm.rotation import angle_between
 from weld_twin_core.errors import ReachError
 from weld_twin_core.motion.inverse import family, polish, solve, solve_path
 from weld_twin_core.motion.inverse.along_path import jumps
-from weld_twin_core.motion.paths import Line, Torch
+from weld_twin_core.motion.inverse.following import follow
+from weld_twin_core.motion.paths import Line, Polyline, Torch
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia')
 
@@ -125,21 +126,24 @@ def test_a_path_keeps_the_branch_nearest_the_seed():
         assert np.abs(np.diff(solution.q, axis=0)).max() < 0.1
 
 
-def test_a_joint_that_passes_half_a_turn_goes_on_and_does_not_jump_back():
-    robot = catalog.load('ur5')
-    start = np.array([3.0, -1.2, 1.5, -1.8, -1.57, 0.0])
-    q = start + np.linspace(0.0, 0.5, 60)[:, None] * np.eye(6)[0]
-    solution = solve_path(robot, forward(robot, q), start)
-    np.testing.assert_allclose(solution.q, q, atol=1e-9)
+WRIST = [0.3, -0.9, 0.7, 0.5, 0.0, -0.7]
 
 
-@pytest.mark.parametrize('name', ['abb_irb120', 'ur5'])
-def test_a_path_through_a_singularity_of_the_wrist_goes_straight_on(name):
+@pytest.mark.parametrize(
+    ('name', 'middle', 'joint', 'reach', 'off'),
+    [
+        ('ur5', [3.25, -1.2, 1.5, -1.8, -1.57, 0.0], 0, 0.25, 1e-9),
+        ('ur5', WRIST, 4, 0.3, 1e-7),
+        ('abb_irb120', WRIST, 4, 0.3, 1e-7),
+    ],
+)
+def test_a_joint_passes_half_a_turn_and_a_wrist_its_singularity_straight_on(
+    name, middle, joint, reach, off
+):
     robot = catalog.load(name)
-    bent = np.linspace(-0.3, 0.3, 40)[:, None] * np.eye(6)[4]
-    q = np.array([0.3, -0.9, 0.7, 0.5, 0.0, -0.7]) + bent
+    q = middle + np.linspace(-reach, reach, 60)[:, None] * np.eye(6)[joint]
     solution = solve_path(robot, forward(robot, q), q[0])
-    np.testing.assert_allclose(solution.q, q, atol=1e-7)
+    np.testing.assert_allclose(solution.q, q, atol=off)
 
 
 def test_a_sample_on_the_singularity_itself_gets_the_posture_around_it():
@@ -147,7 +151,7 @@ def test_a_sample_on_the_singularity_itself_gets_the_posture_around_it():
     robot = catalog.load('abb_irb120')
     step = 0.015
     bent = step * np.arange(-20, 21)[:, None] * np.eye(6)[4]
-    q = np.array([0.3, -0.9, 0.7, 0.5, 0.0, -0.7]) + bent
+    q = WRIST + bent
     poses = forward(robot, q)
     solution = solve_path(robot, poses, q[0])
     assert solution.residual.max() < 1e-9
@@ -199,3 +203,67 @@ def test_a_joint_limit_in_the_way_is_named():
     )
     with pytest.raises(ReachError, match=r"'joint_5' would have to be at .* outside \[-0\.010, 0"):
         solve(narrow, forward(robot, q))
+
+
+NAMES = ['ur5', 'abb_irb120', 'kuka_kr6_r900']
+START = np.array([0.3, -0.9, 0.7, 0.5, 0.8, -0.7])
+
+
+def motion(count, size=0.3):
+    """Return joint positions along a smooth motion, shape (count, 6)."""
+    s = np.linspace(0.0, 1.0, count)[:, None]
+    return START + size * (
+        np.sin(s * [1.1, 0.7, 1.3, 2.0, 1.7, 0.9] + np.arange(6.0)) - np.sin(np.arange(6.0))
+    )
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('count', [32, 57, 1000, 4500])
+def test_the_joint_positions_a_path_was_made_from_are_found_again(name, count):
+    robot, q = catalog.load(name), motion(count)
+    np.testing.assert_allclose(follow(robot, forward(robot, q), q[0] + 0.01), q, atol=1e-10)
+
+
+def test_an_arm_without_a_closed_form_is_followed_as_well():
+    rng = np.random.default_rng(0)
+    robot = catalog.load('ur5')
+    robot = replace(robot, alpha=robot.alpha + 1e-3 * rng.normal(size=6))
+    q = motion(200)
+    solution = solve_path(robot, forward(robot, q), q[0])
+    assert solution.method == 'followed'
+    np.testing.assert_allclose(solution.q, q, atol=1e-10)
+
+
+def test_a_motion_that_swings_far_is_followed_in_pieces():
+    robot, q = catalog.load('ur5'), motion(1500, size=0.1)
+    q[:, [0, 5]] += np.linspace(0.0, 3.0, len(q))[:, None]
+    np.testing.assert_allclose(follow(robot, forward(robot, q), q[0]), q, atol=1e-9)
+
+
+def test_a_corner_of_the_seam_is_left_to_the_careful_way_and_closes():
+    robot = catalog.load('ur5')
+    path = Polyline([[0.4, -0.1, 0.2], [0.4, 0.1, 0.2], [0.5, 0.1, 0.2]])
+    poses = Torch().poses(path.sample(np.linspace(0.0, path.length, 301)))
+    whole = solve_path(robot, poses)
+    again = solve_path(robot, poses, whole.q[0])
+    assert again.residual.max() < 1e-9
+    np.testing.assert_allclose(again.q, whole.q, atol=1e-8)
+
+
+def test_nothing_is_followed_where_there_is_doubt():
+    robot, q = catalog.load('ur5'), motion(200)
+    poses = forward(robot, q)
+    assert follow(robot, poses[:31], q[0]) is None
+    assert follow(robot, poses, q[0] + 0.3) is None
+    assert follow(replace(robot, upper=q.max(axis=0) - 1e-3), poses, q[0]) is None
+    assert follow(catalog.load('franka_panda'), poses, np.zeros(7)) is None
+    leap = np.concatenate([poses[:100], forward(robot, q[100:] + [0.7, 0, 0, 0, 0, 0])])
+    assert follow(robot, leap, q[0]) is None
+
+
+def test_a_wrist_that_comes_by_its_singularity_is_not_followed():
+    robot = catalog.load('abb_irb120')
+    q = START + np.linspace(0.0, 1.0, 200)[:, None] * [0.2, 0.1, 0.0, 0.0, -0.8, 0.3]
+    poses = forward(robot, q)
+    assert follow(robot, poses, q[0]) is None
+    np.testing.assert_allclose(solve_path(robot, poses, q[0]).q[:-1], q[:-1], atol=1e-6)

@@ -1,16 +1,24 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every correction of data can be written down and made again, and does the same."""
+"""Corrections that are written down do the same again, and many trials at once are each alone."""
 
 import json
+from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 import pytest
-from measured_cells import moving, recorded
+from measured_cells import anywhere, moving, recorded, stations
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.frames.alignment import TOGETHER
 from weld_twin_core.diagnosis.soundness import mending
 from weld_twin_core.diagnosis.soundness.mending import Given, as_entry, replayed
+from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, rough_models, snapshot
+from weld_twin_core.diagnosis.soundness.suspicions import suspicions
+from weld_twin_core.effects import JointOffset
 from weld_twin_core.errors import ModelError
 
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -66,3 +74,34 @@ def test_clocks_are_of_one_recording_alone(ur5, rng):
 def test_a_correction_that_does_not_fit_is_refused(entry, ur5, rng):
     with pytest.raises(ModelError, match='correction'):
         replayed([entry], Given((recorded(ur5, moving(ur5, rng), rng),), ur5))
+
+
+def shot_of(robot, rng, points, count=1):
+    """Return stations of an arm with wrong zeros that stands elsewhere, as a snapshot."""
+    tool = anywhere(rng, 0.1)
+    bent = [JointOffset(name, 2e-3 * rng.standard_normal()) for name in robot.joint_names]
+    recordings = tuple(
+        recorded(
+            robot.with_frames(base=anywhere(rng, 2.0), tool=tool),
+            stations(robot, rng, 30),
+            rng,
+            effects=bent,
+            points=points,
+        )
+        for _ in range(count)
+    )
+    model = Model(robot, tuple(robot.T_world_base for _ in recordings))
+    motions = [r.joints.q for r in recordings]
+    return snapshot(Problem(recordings, FRAMES), model, motions)
+
+
+@pytest.mark.parametrize('points', [False, True])
+def test_many_trials_at_once_are_each_of_them_alone(points, rng):
+    shot = shot_of(load('ur5'), rng, points)
+    trials = [shot.mended(each.mend) for each in islice(suspicions(shot.robot), 0, None, 5)]
+    assert len(trials) > TOGETHER
+    for thorough in (False, True):
+        together = rough_models(trials, thorough=thorough)
+        for trial, model in zip(trials, together, strict=True):
+            alone = rough_models([replace(trial)], thorough=thorough)[0]
+            assert trial.gap(model) == pytest.approx(trial.gap(alone), rel=1e-6)

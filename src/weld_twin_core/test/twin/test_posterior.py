@@ -101,41 +101,35 @@ def test_the_covariance_is_that_of_poses_of_drawn_models():
         assert np.abs((mine - theirs) / np.outer(size, size)).max() < 0.02
 
 
+STILL = Recording('m', JointMotion(np.zeros(1), np.zeros((1, 1)), None, True))
+
+
+def one_joint(reach, **tool):
+    joints = [{'name': 'j', 'a': reach, 'alpha': 0.0, 'd': 0.0}]
+    return Robot.from_mapping({'name': 'one', 'joints': joints, **tool})
+
+
 def test_turns_are_about_the_fixed_axes_of_the_world():
     """A tool that lies on its side: its own z axis points along the world's x."""
-    robot = Robot.from_mapping(
-        {
-            'name': 'one',
-            'joints': [{'name': 'j', 'a': 0.0, 'alpha': 0.0, 'd': 0.0}],
-            'tool': {'xyz': [0.5, 0, 0], 'quat_xyzw': [0, np.sqrt(0.5), 0, np.sqrt(0.5)]},
-        }
-    )
-    what = Directions(('tool',), 1, ())
-    covariance = np.zeros((6, 6))
-    covariance[5, 5] = 4e-6  # 2 mrad about the tool's own z axis
-    still = Recording('m', JointMotion(np.zeros(1), np.zeros((1, 1)), None, True))
-    got = pose_covariances(posterior(robot, what, covariance), Twin(robot), still, np.zeros(1))[0]
-    wanted = np.zeros((6, 6))
-    wanted[3, 3] = 4e-6
-    np.testing.assert_allclose(got, wanted, atol=1e-15)
+    aside = {'xyz': [0.5, 0, 0], 'quat_xyzw': [0, np.sqrt(0.5), 0, np.sqrt(0.5)]}
+    robot, what = one_joint(0.0, tool=aside), Directions(('tool',), 1, ())
+    # 2 mrad about the tool's own z axis
+    known = posterior(robot, what, np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 4e-6]))
+    (got,) = pose_covariances(known, Twin(robot), STILL, np.zeros(1))
+    np.testing.assert_allclose(got, np.diag([0.0, 0.0, 0.0, 4e-6, 0.0, 0.0]), atol=1e-15)
 
 
 def test_a_turn_of_the_base_moves_the_tool_by_its_lever():
-    robot = Robot.from_mapping(
-        {'name': 'one', 'joints': [{'name': 'j', 'a': 0.8, 'alpha': 0.0, 'd': 0.0}]}
-    )
-    what = Directions(('base',), 2, ())
-    covariance = np.zeros((12, 12))
-    covariance[11, 11] = 1e-6  # 1 mrad about z, of the second set-up
-    still = Recording('m', JointMotion(np.zeros(1), np.zeros((1, 1)), None, True))
-    known = posterior(robot, what, covariance)
-    got = pose_covariances(known, Twin(robot), still, np.zeros(1), setup=1)[0]
+    robot, what = one_joint(0.8), Directions(('base',), 2, ())
+    # 1 mrad about z, of the second set-up
+    known = posterior(robot, what, np.diag([*np.zeros(11), 1e-6]))
+    (got,) = pose_covariances(known, Twin(robot), STILL, np.zeros(1), setup=1)
     wanted = np.zeros((6, 6))
     wanted[1, 1], wanted[5, 5], wanted[1, 5], wanted[5, 1] = 0.64e-6, 1e-6, 0.8e-6, 0.8e-6
     np.testing.assert_allclose(got, wanted, atol=1e-15)
-    assert np.abs(pose_covariances(known, Twin(robot), still, np.zeros(1))).max() == 0.0
+    assert np.abs(pose_covariances(known, Twin(robot), STILL, np.zeros(1))).max() == 0.0
     with pytest.raises(ModelError, match='no base frame 2'):
-        pose_covariances(known, Twin(robot), still, np.zeros(1), setup=2)
+        pose_covariances(known, Twin(robot), STILL, np.zeros(1), setup=2)
 
 
 def test_a_joint_gives_when_it_is_accelerated_as_far_as_its_spring_lets_it():

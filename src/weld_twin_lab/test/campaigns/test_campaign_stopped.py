@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A campaign that is told to end takes the nodes it started with it."""
+"""A campaign that is stopped or killed ends its nodes and leaves what was sent."""
 
 import os
 import signal
@@ -13,7 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from weld_twin_lab.campaigns.kill import Trial, try_once
+
 pytest.importorskip('rclpy', reason='needs ROS 2')
+
 
 pytestmark = pytest.mark.cells
 
@@ -70,3 +73,10 @@ def test_sigterm_ends_the_nodes_too(tmp_path: Path) -> None:
                 os.kill(pid, signal.SIGKILL)
         process.wait()
     assert not out.exists()
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_a_kill_leaves_a_prefix_of_what_was_sent(storage):
+    row = try_once(Trial(storage, moment=1.0, closing=False, split_mb=0.1, wait=0.0))
+    assert row['fault'] == ''
+    assert row['sent'] > 0

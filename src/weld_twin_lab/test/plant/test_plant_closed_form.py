@@ -1,12 +1,13 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects beside the twin, which is held against their definitions; and what the twin does otherwise."""
+"""The plant against the product of its rows, the twin and values by hand."""
 
 from dataclasses import fields
 
 import numpy as np
 import pytest
-from plant_cells import UR5, dh_pose, dh_positions, record, stations, weave
+from plant_cells import EXACT, ROBOTS, UR5, dh_pose, dh_positions, record, stations, weave
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import REGISTRY, effects_from_list
@@ -127,3 +128,43 @@ def test_measurement_noise():
     got = record(UR5, [{'effect': 'measurement_noise', 'sigma': 5e-5}], command)
     scatter = got.position - dh_positions(UR5, command.q)
     assert np.std(scatter) == pytest.approx(5e-5, rel=0.05)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_clean_stations_are_the_dh_product(name):
+    robot = ROBOTS[name]
+    command = stations(robot, 40)
+    got = record(robot, [], command)
+    for q, position, quaternion in zip(command.q, got.position, got.quaternion, strict=True):
+        want = dh_pose(robot, q)
+        assert np.abs(position - want[:3, 3]).max() < 1e-12
+        assert np.abs(Rotation.from_quat(quaternion).as_matrix() - want[:3, :3]).max() < 1e-12
+    assert got.static
+    assert np.array_equal(got.t_measured, command.t)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_clean_motion_is_the_dh_product(name):
+    robot = ROBOTS[name]
+    command = weave(robot, 2.0)
+    got = record(robot, [], command)
+    assert np.abs(got.position - dh_positions(robot, command.q)).max() < 1e-10
+    assert np.allclose(got.q, command.q, rtol=0.0, atol=1e-14)
+    assert np.allclose(got.qd[1:-1], np.gradient(command.q, command.t, axis=0)[1:-1], atol=2e-3)
+
+
+def test_between_samples_the_motion_is_smooth():
+    command, fine = weave(UR5, 1.5), weave(UR5, 1.5, rate=1000.0)
+    got = record(UR5, [], command, Tracker(rate=77.0))
+    want = np.stack(
+        [np.interp(got.t_measured, fine.t, column) for column in dh_positions(UR5, fine.q).T],
+        axis=1,
+    )
+    assert np.abs(got.position - want).max() < 2e-6
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(ValueError, match='unknown effect'):
+        record(UR5, [{'effect': 'gremlins'}], stations(UR5, 3), EXACT)
+    with pytest.raises(ValueError, match='no joint'):
+        record(UR5, [{'effect': 'backlash', 'joint': 'knee', 'width': 1e-4}], stations(UR5, 3))

@@ -120,12 +120,6 @@ def test_yaml_round_trips_to_the_last_bit(name, tmp_path):
     assert again.to_mapping() == robot.to_mapping()
 
 
-def test_exponents_without_a_point_are_numbers(tmp_path):
-    (tmp_path / 'r.yaml').write_text('name: r\njoints:\n- {name: j, a: 1e-3, alpha: -2E+0}\n')
-    robot = load_robot(str(tmp_path / 'r.yaml'))
-    assert (robot.a[0], robot.alpha[0]) == (0.001, -2.0)
-
-
 def one_joint(keys='', **more):
     """Return a robot file of one joint, with more keys of it and of the robot."""
     own = ''.join(f'{key}: {value}\n' for key, value in more.items())
@@ -133,6 +127,13 @@ def one_joint(keys='', **more):
 
 
 BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
+
+
+@pytest.mark.parametrize('gravity', ([0.0, 0.0, 0.0], [0.0, -7.0, -7.0]))
+def test_exponents_without_a_point_are_numbers_and_an_arm_may_hang_or_float(tmp_path, gravity):
+    (tmp_path / 'r.yaml').write_text(one_joint(', a: 1e-3, alpha: -2E+0', gravity=gravity))
+    robot = load_robot(str(tmp_path / 'r.yaml'))
+    assert (robot.a[0], robot.alpha[0], robot.gravity.tolist()) == (0.001, -2.0, gravity)
 
 
 @pytest.mark.parametrize(
@@ -149,11 +150,13 @@ BOMB = 'a: &a [x, x]\nb: &b [*a, *a]\n'
         ),
         (one_joint(', lower: -170, upper: 170'), 'lower is -170, which looks'),
         (one_joint(', a: 425'), 'a is 425, which looks like millimetres'),
+        (one_joint(', d: 89.2'), 'd is 89.2, which looks like millimetres'),
+        (one_joint(links='[{mass: 1, com: [0, 0, -26]}]'), "joint 'j': com is 26, which looks"),
         (
             one_joint(tool='{xyz: [0, 0, 250], quat_xyzw: [0, 0, 0, 1]}'),
             'tool is 250 away, which looks',
         ),
-        (one_joint(payload='{mass: 2, com: [0, 0, 80]}'), 'com is 80 away'),
+        (one_joint(payload='{mass: 2, com: [0, 0, 80]}'), "payload's com is 80 away, which looks"),
         (one_joint(gravity='[0, 0, -1]'), 'gravity is 1; it is in m/s^2'),
         (one_joint(gravity='[0, 0, -9810]'), 'gravity is 9810; it is in'),
         (one_joint(', b: 1'), "joint 'j' has the unknown key 'b'"),

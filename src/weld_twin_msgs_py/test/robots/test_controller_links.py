@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which links of a URDF are the controller's base and flange, and that no corrected file loses them."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward, frames
 from weld_twin_core.arm.dynamics import payload_torque, wrench_torque
 from weld_twin_core.diagnosis.advice import actions
@@ -17,7 +15,6 @@ from weld_twin_core.errors import ModelError
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.twin.compensation import corrected
 from weld_twin_msgs_py.robots import load_robot, write_robot_yaml, write_urdf
-from weld_twin_msgs_py.robots.urdf_read import refuse_wrong_units
 from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 
 MOVES = (
@@ -207,35 +204,3 @@ def test_a_tool_is_corrected_along_the_axes_of_the_controllers_flange(tmp_path):
     on_flange = np.linalg.inv(robot.controller.flange)
     shift = (on_flange @ (real.T_flange_tool - robot.T_flange_tool))[:3, 3]
     np.testing.assert_allclose(shift, [1e-3, 0.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ('key', 'value', 'said'),
-    [
-        (
-            'd',
-            [89.2, 0.0, 0.0, 109.0, 94.6, 82.3],
-            "'shoulder_pan_joint': d is 89.2, which .* mill",
-        ),
-        ('a', [0.0, -425.0, -392.0, 0.0, 0.0, 0.0], "'shoulder_lift_joint': a is -425, .* millim"),
-        ('alpha', [90.0, 0.0, 0.0, 90.0, -90.0, 0.0], "pan_joint': alpha is 90, .* degrees"),
-        ('lower', [-360.0] * 6, "pan_joint': lower is -360, .* degrees"),
-        (
-            'com',
-            [[0.0, 0.0, 0.0]] * 5 + [[0.0, 0.0, -26.0]],
-            "'wrist_3_joint': com is 26, .* mill",
-        ),
-        (
-            'payload_com',
-            [0.0, 0.0, 80.0],
-            "payload's com is 80 away, which looks like millimetres",
-        ),
-        ('gravity', [0.0, 0.0, -9810.0], 'gravity is 9810; it is in m/s'),
-        ('gravity', [0.0, 0.0, 0.0], ''),
-        ('gravity', [0.0, -7.0, -7.0], ''),
-    ],
-)
-def test_a_robot_in_millimetres_or_degrees_is_refused(key, value, said):
-    robot = replace(catalog.load('ur5'), **{key: np.array(value)})
-    with pytest.raises(ModelError, match=said) if said else nullcontext():
-        refuse_wrong_units(robot)

@@ -1,20 +1,25 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes as programs: how they start, stop, die, and what the recorder keeps then."""
+"""Nodes as programs, in domains of their own: how they start, stop, die, and what is kept then."""
 
+import os
 import signal
 import subprocess
 import sys
+import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
+from participants import participant
 from rosgraph_msgs.msg import Clock
 
 from weld_twin_core.errors import ModelError, TwinError
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import CellTimeout
+from weld_twin_nodes.harness.process import DOMAINS, own_domain
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
@@ -135,3 +140,63 @@ def test_a_bag_is_played_into_the_cell(cell, robot):
         rtol=0.0,
         atol=1e-15,
     )
+
+
+OTHER = 102
+"""A domain that no cell of a test is given."""
+
+HOLD = """
+import os, sys
+os.getpid = lambda: int(sys.argv[1])
+from weld_twin_nodes.harness.process import own_domain
+with own_domain() as domain:
+    print(domain, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def same_start(monkeypatch):
+    """All processes of a test begin to look at one domain, as those do whose numbers are so apart."""
+    number = os.getpid()
+    monkeypatch.setattr(os, 'getpid', lambda: number)
+    return number
+
+
+def test_another_process_has_another_domain_which_is_free_again_once_that_is_killed(
+    same_start, tmp_path
+):
+    """Its folder for temporary files is another, too, as it is for other users."""
+    assert str(tmp_path) != tempfile.gettempdir()
+    for _ in range(5):  # somebody else on this machine may take it first
+        other = subprocess.Popen(
+            [sys.executable, '-c', HOLD, str(same_start)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, 'TMPDIR': str(tmp_path)},
+        )
+        theirs = int(other.stdout.readline())
+        try:
+            with own_domain() as ours:
+                assert ours != theirs
+        finally:
+            other.kill()
+            other.communicate()
+        with own_domain() as ours:
+            if ours == theirs:
+                return
+    pytest.fail('no domain of a holder that was killed was given again')
+
+
+@pytest.mark.parametrize('elsewhere', [0, 6])
+def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same_start, elsewhere):
+    with ExitStack() as strangers:
+        for _ in range(elsewhere):  # a process numbers its participants of all domains in one row
+            strangers.enter_context(participant('stranger', OTHER))
+        with own_domain() as free:
+            pass
+        strangers.enter_context(participant('stranger', free))
+        with own_domain() as ours:
+            assert ours in DOMAINS
+            assert ours != free

@@ -356,44 +356,40 @@ def test_a_model_written_without_a_posterior_still_predicts_and_says_so(cell, fo
 
 
 @pytest.mark.parametrize(
-    ('spoil', 'reason'),
+    ('command', 'spoil', 'reason'),
     [
-        (lambda p: p.pop('covariance'), "lacks 'covariance'"),
-        (lambda p: p['covariance'].pop(), 'lower triangle'),
-        (lambda p: p['recorded']['joints'].reverse(), 'it was made for joints'),
-        (lambda p: p['discrepancy'].update(position_m=-1.0), 'must be a size'),
-        (lambda p: p['discrepancy'].update(position_m=0.0), 'was changed after it was written'),
-        (lambda p: p['recorded']['joints'][0]['measured'].pop(), 'was changed after'),
-    ],
-)
-def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, spoil, reason):
-    data = json.loads((found / 'diagnosis.json').read_text())
-    spoil(data['posterior'])
-    (tmp_path / 'spoilt.json').write_text(json.dumps(data))
-    words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
-    assert reason in refused('simulate', cell / 'second', *words)
-
-
-@pytest.mark.parametrize(
-    ('spoil', 'reason'),
-    [
+        ('simulate', lambda d: d['posterior'].pop('covariance'), "lacks 'covariance'"),
+        ('simulate', lambda d: d['posterior']['covariance'].pop(), 'lower triangle'),
+        ('simulate', lambda d: joints(d).reverse(), 'it was made for joints'),
+        ('simulate', lambda d: discrepancy(d, -1.0), 'must be a size'),
+        ('simulate', lambda d: discrepancy(d, 0.0), 'was changed after it was written'),
+        ('simulate', lambda d: joints(d)[0]['measured'].pop(), 'was changed after'),
+        ('verify', lambda d: d['verdict'].update(causes=[7]), 'verdict.causes[0] needs a mapping'),
         (
-            lambda d: d['verdict'].update(causes=[7]),
-            'verdict.causes[0] needs a mapping, and has 7',
+            'verify',
+            lambda d: d['model']['alone'].update(whole_recorded_m=None),
+            'the model of diagnosis',
         ),
-        (lambda d: d['model']['alone'].update(whole_recorded_m=None), 'the model of diagnosis'),
-        (lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs[0].use needs a text'),
-        (lambda d: d['model'].update(counted=[]), 'model.counted needs a mapping, and has []'),
-        (lambda d: d.update(shrink=None), 'shrink of the diagnosis means nothing'),
-        (lambda d: d['gap'].pop('noise_floor_m'), 'shrink of the diagnosis means nothing'),
+        ('verify', lambda d: d.update(inputs=[{'path': 'x'}]), 'inputs[0].use needs a text'),
+        ('verify', lambda d: d['model'].update(counted=[]), 'needs a mapping, and has []'),
+        ('verify', lambda d: d.update(shrink=None), 'shrink of the diagnosis means nothing'),
+        ('verify', lambda d: d['gap'].pop('noise_floor_m'), 'shrink of the diagnosis means'),
     ],
 )
-def test_a_part_that_somebody_changed_is_one_line(cell, found, tmp_path, spoil, reason):
+def test_a_part_that_somebody_changed_is_one_line(cell, found, tmp_path, command, spoil, reason):
     data = json.loads((found / 'diagnosis.json').read_text())
     spoil(data)
     (tmp_path / 'spoilt.json').write_text(json.dumps(data))
-    words = ('verify', cell / 'second', '--robot', 'ur5', '--model', tmp_path / 'spoilt.json')
-    assert reason in refused(*words)
+    words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
+    assert reason in refused(command, cell / 'second', *words)
+
+
+def joints(data):
+    return data['posterior']['recorded']['joints']
+
+
+def discrepancy(data, size):
+    data['posterior']['discrepancy'].update(position_m=size)
 
 
 def test_a_diagnosis_of_the_first_version_is_still_held_against_a_recording(cell, found, tmp_path):

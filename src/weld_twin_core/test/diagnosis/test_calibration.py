@@ -221,24 +221,20 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
     assert other.confidence < right.confidence or other.status == 'unknown'
 
 
+def cause(*levels, **more):
+    """Return the one cause that there is, from pairs of what may be and how likely it is."""
+    return Cause(*map(tuple, levels), 0.9, (0.8, 1.0), (0,), effect=0, **more)
+
+
 def test_a_set_over_several_places_is_sure_of_none_of_them():
     zero, tilt = Site('joint_offset', 'wrist'), Site('gear_ratio', 'elbow')
     candidate_set = (Alternative(zero, 9.0, _Fit(), 0.5), Alternative(tilt, 9.0, _Fit(), 0.5))
     row = Row.of(candidate_set, wt.Beliefs())
-    cause = Cause(
-        tuple(row.places().items()),
-        tuple(row.dependences().items()),
-        tuple(row.names().items()),
-        0.9,
-        (0.8, 1.0),
-        (0,),
-        row=0,
-        effect=0,
-    )
+    own = cause(row.places().items(), row.dependences().items(), row.names().items(), row=0)
     names = (Statement('name', 0, {'size': 1.0, 'members': 2.0}, 0.9),)
     before = Stated((row,), names, None, {}, 1e-5)
     verdict = Verdict('ambiguous', ((zero, tilt),))
-    _, (told,), _ = calibrated(verdict, (cause,), before, {})
+    _, (told,), _ = calibrated(verdict, (own,), before, {})
     assert told.probability == pytest.approx(0.9)
     assert dict(told.name) == pytest.approx({zero: 0.45, tilt: 0.45})
     # Where the set is right each place is as likely as its name; only where it is wrong a place may
@@ -263,18 +259,9 @@ def test_kinds_that_are_each_likelier_wrong_than_right_identify_nothing(growth, 
     kind = Family(
         'link_length', (growth, growth), True, ((site, size),), size, ((site, 1.0),), named=True
     )
-    cause = Cause(
-        (('elbow_joint', 1.0),),
-        (('constant', 1.0),),
-        ((site, 1.0),),
-        0.9,
-        (0.8, 1.0),
-        (0,),
-        effect=0,
-    )
+    own = cause([('elbow_joint', 1.0)], [('constant', 1.0)], [(site, 1.0)])
     verdict = Verdict('identified', ((site,),), families=(kind,))
-    reported, (told,), _ = calibrated(
-        verdict, (cause,), Stated((), (), None, {}, (1e-5, 1e-5)), {}
-    )
+    before = Stated((), (), None, {}, (1e-5, 1e-5))
+    reported, (told,), _ = calibrated(verdict, (own,), before, {})
     assert (told.probability > 0.5) is (status == 'identified')
     assert reported.status == status

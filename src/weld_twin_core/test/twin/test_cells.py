@@ -158,30 +158,19 @@ def test_a_root_that_is_off_moves_the_positioner_along_the_axes_of_the_base(cell
     np.testing.assert_allclose(forward(again, q), expected, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ('entry', 'moves'),
-    [
-        (
-            {'effect': 'guide_bend', 'joint': 'track', 'curvature': [1e-3, -5e-4]},
-            lambda s: step('x', slide=5e-4 * s**2) @ step('y', slide=-2.5e-4 * s**2),
-        ),
-        (
-            {'effect': 'guide_tilt', 'joint': 'track', 'rate': [2e-4, 0.0, 0.0]},
-            lambda s: step('x', 2e-4 * s),
-        ),
-        (
-            {'effect': 'guide_tilt', 'joint': 'track', 'rate': [0.0, -3e-4, 0.0]},
-            lambda s: step('y', -3e-4 * s),
-        ),
-        (
-            {'effect': 'guide_tilt', 'joint': 'track', 'rate': [0.0, 0.0, 3e-4]},
-            lambda s: step('z', 3e-4 * s),
-        ),
-    ],
-)
+GUIDES = {
+    'bend': ({'effect': 'guide_bend', 'curvature': [1e-3, -5e-4]},
+             lambda s: step('x', slide=5e-4 * s**2) @ step('y', slide=-2.5e-4 * s**2)),
+    'roll': ({'effect': 'guide_tilt', 'rate': [2e-4, 0.0, 0.0]}, lambda s: step('x', 2e-4 * s)),
+    'pitch': ({'effect': 'guide_tilt', 'rate': [0.0, -3e-4, 0.0]}, lambda s: step('y', -3e-4 * s)),
+    'yaw': ({'effect': 'guide_tilt', 'rate': [0.0, 0.0, 3e-4]}, lambda s: step('z', 3e-4 * s)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(('entry', 'moves'), GUIDES.values(), ids=GUIDES)
 def test_a_guide_moves_its_carriage_and_all_it_carries(cell, entry, moves):
     q = postures(cell)
-    poses = Twin(cell, [effect_from_mapping(entry)]).poses(still(q))
+    poses = Twin(cell, [effect_from_mapping({**entry, 'joint': 'track'})]).poses(still(q))
     expected = seen(cell, q, after=('track', moves))
     # The lever turns by the lean itself: what is left is its square.
     np.testing.assert_allclose(poses.position, expected[:, :3, 3], atol=2e-7)

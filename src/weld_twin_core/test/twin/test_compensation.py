@@ -30,14 +30,13 @@ def seam(robot, profile='smooth'):
     return Recording('seam', plan(robot, default_seam(robot), profile, fit=True).motion)
 
 
-def effects(robot, *entries):
+def effects(*entries):
     return tuple(effect_from_mapping(entry) for entry in entries)
 
 
 def geometric(robot):
     j = robot.joint_names
     return effects(
-        robot,
         {'effect': 'joint_offset', 'joint': j[1], 'offset': 2e-3},
         {'effect': 'link_length', 'joint': j[2], 'da': 1e-3},
         {'effect': 'link_offset', 'joint': j[3], 'dd': -1e-3},
@@ -93,7 +92,6 @@ def test_beside_a_singular_wrist_the_tool_is_where_it_should_be_and_no_joint_jum
     recording = Recording('wrist', JointMotion(np.arange(6.0), q, static=True))
     j = arm.joint_names
     acting = effects(
-        arm,
         {'effect': 'link_twist', 'joint': j[2], 'dalpha': 5e-4},
         {'effect': 'joint_offset', 'joint': j[1], 'offset': -5e-4},
         {'effect': 'joint_offset', 'joint': j[3], 'offset': 8e-4},
@@ -112,7 +110,7 @@ def test_a_gear_error_is_compensated_in_position_and_speed():
     robot = load('ur5')
     gear = {'effect': 'gear_ratio', 'joint': 'shoulder_pan_joint', 'scale': 1e-3}
     recording = seam(robot)
-    result = compensate(robot, effects(robot, gear), recording)
+    result = compensate(robot, effects(gear), recording)
     assert np.abs(result.motion.q[:, 0] - recording.joints.q[:, 0] / 1.001).max() < 1e-9
     speed = recording.joints.qd[:, 0] / 1.001
     assert np.abs(result.motion.qd[5:-5, 0] - speed[5:-5]).max() < 1e-5
@@ -126,7 +124,7 @@ def test_springs_under_gravity_and_process_force_are_closed():
     ]
     motion = seam(robot).joints
     force = Signal(motion.t[[0, -1]], np.array([[0, 0, 80.0, 0, 0, 0], [40.0, 0, 0, 0, 0, 0]]))
-    result = compensate(robot, effects(robot, *soft), Recording('seam', motion, wrench=force))
+    result = compensate(robot, effects(*soft), Recording('seam', motion, wrench=force))
     assert result.rms[0] > 1e-4 and np.abs(result.after).max() < 1e-9
 
 
@@ -139,7 +137,7 @@ def test_springs_under_gravity_and_process_force_are_closed():
 )
 def test_effects_with_memory_shrink_by_iteration(entry, gain):
     robot = load('ur5')
-    acting = effects(robot, {**entry, 'joint': 'shoulder_pan_joint'})
+    acting = effects({**entry, 'joint': 'shoulder_pan_joint'})
     before, after = compensate(robot, acting, seam(robot, 'aggressive')).rms
     assert before > 1e-4 and after < before / gain
 
@@ -147,14 +145,13 @@ def test_effects_with_memory_shrink_by_iteration(entry, gain):
 def test_a_resonance_never_makes_it_worse():
     robot = load('ur5')
     shaky = effects(
-        robot,
         {
             'effect': 'vibration',
             'joint': 'shoulder_pan_joint',
             'frequency': 8.0,
             'damping': 0.05,
             'gain': 0.3,
-        },
+        }
     )
     before, after = compensate(robot, shaky, seam(robot, 'aggressive')).rms
     assert after <= before
@@ -163,7 +160,6 @@ def test_a_resonance_never_makes_it_worse():
 def test_errors_of_the_instrument_are_left_alone():
     robot = load('ur5')
     own = effects(
-        robot,
         {'effect': 'time_delay', 'delay': 0.02},
         {'effect': 'measurement_scale', 'scale': 1e-3},
         {'effect': 'drift', 'xyz_rate': [1e-5, 0, 0]},
@@ -187,13 +183,12 @@ def test_stations_are_compensated_one_by_one():
 
 def test_constant_errors_go_into_the_numbers_of_the_robot(robot):
     ripple = effects(
-        robot,
         {
             'effect': 'transmission_ripple',
             'joint': robot.joint_names[0],
             'amplitude': 1e-4,
             'order': 2.0,
-        },
+        }
     )
     got, left = corrected(robot, geometric(robot) + ripple)
     wanted = in_numbers(robot)
@@ -207,9 +202,7 @@ def test_the_offset_of_a_slide_goes_into_its_travel():
     data = load('ur5').to_mapping()
     data['joints'][0] |= {'type': 'prismatic'}
     robot = Robot.from_mapping(data)
-    error = effects(
-        robot, {'effect': 'joint_offset', 'joint': robot.joint_names[0], 'offset': 1e-3}
-    )
+    error = effects({'effect': 'joint_offset', 'joint': robot.joint_names[0], 'offset': 1e-3})
     got, _ = corrected(robot, error)
     assert got.d[0] == pytest.approx(robot.d[0] + 1e-3) and np.array_equal(got.theta, robot.theta)
 
@@ -217,7 +210,7 @@ def test_the_offset_of_a_slide_goes_into_its_travel():
 def test_a_payload_is_joined_with_the_one_declared():
     data = load('ur5').to_mapping() | {'payload': {'mass': 2.0, 'com': [0.0, 0.0, 0.1]}}
     robot = Robot.from_mapping(data)
-    more = effects(robot, {'effect': 'payload', 'mass': 1.0, 'com': [0.3, 0.0, 0.1]})
+    more = effects({'effect': 'payload', 'mass': 1.0, 'com': [0.3, 0.0, 0.1]})
     got, left = corrected(robot, more)
     assert got.payload_mass == 3.0 and left == ()
     assert got.payload_com == pytest.approx([0.1, 0.0, 0.1])

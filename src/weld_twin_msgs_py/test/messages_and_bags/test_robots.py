@@ -95,16 +95,10 @@ def test_nearly_parallel_axes_keep_their_numbers_small(tmp_path):
 
 def test_modified_convention_is_written_exactly(tmp_path):
     rows = [
-        {
-            'name': f'j{k}',
-            'a': 0.1 * k,
-            'alpha': 0.7 - k,
-            'd': 0.3,
-            'theta_offset': 0.2 * k,
-            'type': 'prismatic' if k == 1 else 'revolute',
-        }
+        {'name': f'j{k}', 'a': 0.1 * k, 'alpha': 0.7 - k, 'd': 0.3, 'theta_offset': 0.2 * k}
         for k in range(4)
     ]
+    rows[1]['type'] = 'prismatic'
     robot = Robot.from_mapping({'name': 'm', 'convention': 'modified', 'joints': rows})
     write_urdf(tmp_path / 'm.urdf', robot)
     q = random_positions(robot)

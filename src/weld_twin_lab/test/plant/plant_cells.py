@@ -5,74 +5,42 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run
 from weld_twin_lab.plant.tracker import Tracker
 
-HALF = np.pi / 2.0
+
+def rows_of(robot):
+    """Return the rows of a bundled arm without its limits, joints named j0 and on."""
+    keys = {'a': robot.a, 'alpha': robot.alpha, 'd': robot.d, 'theta_offset': robot.theta}
+    rows = [{key: float(value[k]) for key, value in keys.items()} for k in range(robot.n)]
+    return [{'name': f'j{k}', **row} for k, row in enumerate(rows)]
 
 
-def _joints(rows: list[tuple], prefix: str = 'j') -> list[dict]:
-    keys = ('a', 'alpha', 'd', 'theta_offset')
-    return [
-        {'name': f'{prefix}{i}', **dict(zip(keys, row, strict=True))} for i, row in enumerate(rows)
-    ]
-
-
-# UR5, Universal Robots' published DH table and masses; frames of base and tool are made up
+# Frames of base and tool are made up, and so is the zero of the last joint.
+ARM, PANDA = load('ur5'), rows_of(load('franka_panda'))
 UR5 = {
     'name': 'ur5',
     'convention': 'standard',
     'gravity': [0.0, 0.0, -9.80665],
     'base': {'xyz': [0.1, 0.2, 0.3], 'quat_xyzw': [0.0, 0.0, 0.38268343, 0.92387953]},
     'tool': {'xyz': [0.02, 0.0, 0.15], 'quat_xyzw': [0.0, 0.25881905, 0.0, 0.96592583]},
-    'joints': _joints(
-        [
-            (0.0, HALF, 0.089159, 0.0),
-            (-0.425, 0.0, 0.0, 0.0),
-            (-0.39225, 0.0, 0.0, 0.0),
-            (0.0, HALF, 0.10915, 0.0),
-            (0.0, -HALF, 0.09465, 0.0),
-            (0.0, 0.0, 0.0823, 0.3),
-        ]
-    ),
-    'links': [
-        {'mass': 3.7, 'com': [0.0, -0.02561, 0.00193]},
-        {'mass': 8.393, 'com': [0.2125, 0.0, 0.11336]},
-        {'mass': 2.33, 'com': [0.15, 0.0, 0.0265]},
-        {'mass': 1.219, 'com': [0.0, -0.0018, 0.01634]},
-        {'mass': 1.219, 'com': [0.0, 0.0018, 0.01634]},
-        {'mass': 0.1879, 'com': [0.0, 0.0, -0.001159]},
-    ],
+    'joints': [*rows_of(ARM)[:5], {**rows_of(ARM)[5], 'theta_offset': 0.3}],
+    'links': ARM.to_mapping()['links'],
     'payload': {'mass': 2.0, 'com': [0.0, 0.01, 0.05]},
 }
-
-# Franka Panda's published modified DH table, on a made-up linear track
+# The rows of a Panda on a made-up linear track.
+TURN = {'a': 0.0, 'alpha': -np.pi / 2.0, 'd': 0.2, 'theta_offset': np.pi / 2.0}
 PANDA_ON_TRACK = {
     'name': 'panda_on_track',
     'convention': 'modified',
     'tool': {'xyz': [0.0, 0.0, 0.1], 'quat_xyzw': [0.0, 0.0, -0.38268343, 0.92387953]},
     'joints': [
-        {
-            'name': 'track',
-            'type': 'prismatic',
-            'a': 0.0,
-            'alpha': -HALF,
-            'd': 0.2,
-            'theta_offset': HALF,
-        }
-    ]
-    + _joints(
-        [
-            (0.0, HALF, 0.333, 0.0),
-            (0.0, -HALF, 0.0, 0.0),
-            (0.0, HALF, 0.316, 0.0),
-            (0.0825, HALF, 0.0, 0.0),
-            (-0.0825, -HALF, 0.384, 0.0),
-            (0.0, HALF, 0.0, 0.0),
-            (0.088, HALF, 0.107, 0.0),
-        ]
-    ),
+        {'name': 'track', 'type': 'prismatic', **TURN},
+        {**PANDA[0], 'alpha': np.pi / 2.0},
+        *PANDA[1:],
+    ],
     'links': [
         {'mass': mass, 'com': [0.01, 0.02, -0.05]}
         for mass in (8.0, 4.97, 0.65, 3.23, 3.59, 1.23, 1.67, 0.74)
@@ -114,24 +82,10 @@ def dh_links(robot: dict, q: np.ndarray, built: dict | None = None) -> list[np.n
         slides = joint.get('type') == 'prismatic'
         theta = row['theta_offset'] + (0.0 if slides else value)
         d = row['d'] + (value if slides else 0.0)
-        if robot['convention'] == 'standard':
-            at = (
-                at
-                @ _about(2, theta)
-                @ _along(2, d)
-                @ _along(0, row['a'])
-                @ _about(0, row['alpha'])
-                @ _about(1, row['beta'])
-            )
-        else:
-            at = (
-                at
-                @ _about(0, row['alpha'])
-                @ _about(1, row['beta'])
-                @ _along(0, row['a'])
-                @ _about(2, theta)
-                @ _along(2, d)
-            )
+        own, along = _about(2, theta) @ _along(2, d), _along(0, row['a'])
+        about = _about(0, row['alpha']) @ _about(1, row['beta'])
+        standard = robot['convention'] == 'standard'
+        at = at @ (own @ along @ about if standard else about @ along @ own)
         out.append(at)
     return out
 

@@ -109,16 +109,8 @@ def test_no_part_left_out_takes_a_recording_with_it():
 
 def test_the_place_of_a_cause_that_was_taken_out_is_where_its_formula_fits():
     # Curves of the tool over the time stood in for a wrist that follows its neighbour.
-    coupled = (
-        'joint_coupling',
-        'joint',
-        'elbow_joint',
-        'source',
-        'shoulder_lift_joint',
-        'ratio',
-        1e-3,
-    )
-    answer = solved(coupled, exclude=('joint_coupling',))
+    follows = ('joint', 'elbow_joint', 'source', 'shoulder_lift_joint', 'ratio', 1e-3)
+    answer = solved(('joint_coupling', *follows), exclude=('joint_coupling',))
     assert answer.status == 'unknown'
     first, *others = answer.causes
     assert first.place[0][0] == 'elbow_joint'

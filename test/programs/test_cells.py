@@ -226,15 +226,16 @@ def cell(tmp_path, arm):
 
 def corrected(cell, language, text, *more):
     (cell / NAMES[language]).write_text(text, encoding='utf-8')
-    words = (
-        'correct',
-        cell / NAMES[language],
-        '--robot',
-        cell / 'cell.yaml',
+    words = ('correct', cell / NAMES[language], '--robot', cell / 'cell.yaml')
+    words += (
         '--out',
         cell / 'out',
+        '--model',
+        cell / 'found.yaml',
+        '--max-correction',
+        '6mm',
+        '1deg',
     )
-    words += ('--model', cell / 'found.yaml', '--max-correction', '6mm', '1deg')
     return weld_twin(*words, *more)
 
 

@@ -12,15 +12,8 @@ from weld_twin_core.arm import catalog
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-BUILDS = (
-    'abb_irb120',
-    'abb_irb1600',
-    'kuka_kr6_r900',
-    'fanuc_m10ia',
-    'ur5',
-    'ur10',
-    'franka_panda',
-)
+BUILDS = ('abb_irb120', 'abb_irb1600', 'kuka_kr6_r900', 'fanuc_m10ia', 'ur5', 'ur10')
+BUILDS += ('franka_panda',)
 
 
 @pytest.fixture(params=BUILDS)

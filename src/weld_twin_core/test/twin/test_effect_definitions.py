@@ -402,15 +402,8 @@ def test_effect_does_what_its_definition_says(
     room = 5e-6 if robot.behind and name == 'pedestal_tilt' else 1e-9
     found = Twin(robot, with_helpers(name, [effect(name, **values)])).poses(recording, at)
     for k, t in enumerate(at):
-        cell = Cell(
-            robot,
-            textbook,
-            t,
-            t - recording.joints.t[0],
-            20.0 + 2.0 * t,
-            recording.wrench.at(np.array(t)),
-            motion_at(robot, t).copy(),
-        )
+        told = t - recording.joints.t[0], 20.0 + 2.0 * t, recording.wrench.at(np.array(t))
+        cell = Cell(robot, textbook, t, *told, motion_at(robot, t).copy())
         definition(cell)
         expected = cell.pose()
         np.testing.assert_allclose(found.position[k], expected[:3, 3], atol=room)

@@ -44,15 +44,11 @@ def test_weights_are_fitted_anew_from_tables_by_one_command(tmp_path, capsys):
         'truth': 'play',
         'said': 'play',
         'status': 'identified',
-        'sure': False,
-        'right': True,
-        'honest': True,
-        'named': True,
-        'place': True,
-        'dependence': True,
         'family': 0.9,
         'seconds': 2.0,
     }
+    more |= dict.fromkeys(('right', 'honest', 'named', 'place', 'dependence'), True)
+    more |= {'sure': False}
     write_rows(tmp_path / 'learn.jsonl.gz', rows[::6])
     write_rows(tmp_path / 'judge.jsonl.gz', [{**row, **more} for row in rows[1:200:6]])
     asked = ['lab', 'belief', '--learn-from', str(tmp_path / 'learn.jsonl.gz'), '--judge-on']

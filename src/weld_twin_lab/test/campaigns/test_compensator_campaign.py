@@ -41,19 +41,9 @@ OTHER = 'exit code 2: weld_twin: diagnosis is of the robot ur10e'
 
 
 def row(**change):
-    return {
-        'robot': 'ur5',
-        'arm': 7,
-        'after': '',
-        'inside': True,
-        'verdict': 'corrected',
-        'before_m': 4e-4,
-        'after_m': 1e-5,
-        'best_m': 0.0,
-        'worst_m': 1.5e-5,
-        'bound_m': 2e-5,
-        **change,
-    }
+    of = {'robot': 'ur5', 'arm': 7, 'after': '', 'inside': True, 'verdict': 'corrected'}
+    was = {'before_m': 4e-4, 'after_m': 1e-5, 'best_m': 0.0, 'worst_m': 1.5e-5, 'bound_m': 2e-5}
+    return {**of, **was, **change}
 
 
 def after(what, **change):

@@ -49,24 +49,12 @@ def test_nine_of_ten_draws_lie_in_their_region():
 
 
 def test_the_table_tells_parts_apart():
-    one = {
-        'poses': 10,
-        'held': 0.9,
-        'flagged': 0.0,
-        'held_unflagged': 0.9,
-        'mean_error_m': 1e-4,
-        'median_sigma_m': 5e-5,
-    }
+    one = {'poses': 10, 'held': 0.9, 'flagged': 0.0, 'held_unflagged': 0.9}
+    one |= {'mean_error_m': 1e-4, 'median_sigma_m': 5e-5}
+    of, worse = {'source': 'ur5', 'group': 'unseen', 'status': 'unknown'}, {**one, 'held': 0.5}
     entries = [
-        {'name': 'a', 'source': 'ur5', 'group': 'unseen', 'status': 'unknown', 'inside': one},
-        {
-            'name': 'b',
-            'source': 'ur5',
-            'group': 'unseen',
-            'status': 'unknown',
-            'inside': {**one, 'held': 0.5, 'poses': 30},
-            'outside': one,
-        },
+        {'name': 'a', **of, 'inside': one},
+        {'name': 'b', **of, 'inside': {**worse, 'poses': 30}, 'outside': one},
         {'name': 'c', 'source': 'plant', 'group': 'unseen', 'refused': 'no pose'},
     ]
     inside, outside = summaries(entries)

@@ -27,16 +27,8 @@ def step(promise, decided):
 def case(name, loop, rounds):
     truth = {'robot': 'ur5', 'motion': 'free', 'sites': [['drift', None]]}
     first, minutes = said(False, False, 'ambiguous'), 1.5 * len(rounds)
-    return {
-        'name': name,
-        'truth': truth,
-        'poor': 'small',
-        'first': first,
-        'rounds': rounds,
-        'end': 'sure',
-        'minutes': minutes,
-        'loop': loop,
-    }
+    told = {'name': name, 'truth': truth, 'poor': 'small', 'first': first}
+    return {**told, 'rounds': rounds, 'end': 'sure', 'minutes': minutes, 'loop': loop}
 
 
 def test_only_what_was_said_counts():

@@ -105,29 +105,14 @@ def test_the_interval_of_a_ratio_holds_it_and_knows_pairs():
 
 
 def entry(kind, over_best, over_frames, **more):
-    inside = {
-        'stations': 50,
-        'mean_m': {},
-        'rms_m': {'frames': 1.0, 'product': 0.5},
-        'over_best': {'ratio': over_best, 'low': over_best - 0.01, 'high': over_best + 0.01},
-        'over_frames': {'ratio': over_frames},
-        'unflagged_over_frames': {'ratio': over_frames},
-        'flagged': 0.0,
-    }
+    best = {'ratio': over_best, 'low': over_best - 0.01, 'high': over_best + 0.01}
+    inside = {'stations': 50, 'mean_m': {}, 'rms_m': {'frames': 1.0, 'product': 0.5}}
+    inside |= {'over_best': best, 'over_frames': {'ratio': over_frames}, 'flagged': 0.0}
+    inside |= {'unflagged_over_frames': {'ratio': over_frames}}
+    of = {'name': f'ur5_{kind}', 'robot': 'ur5', 'kind': kind, 'stations': 200}
+    said = {'status': 'identified', 'families': ['link_twist'], 'beyond': [], 'traceback': None}
     claimed = {'ratio': 0.5, 'ci95': [0.4, 0.6]}
-    return {
-        'name': f'ur5_{kind}',
-        'robot': 'ur5',
-        'kind': kind,
-        'stations': 200,
-        'status': 'identified',
-        'families': ['link_twist'],
-        'beyond': [],
-        'claimed': claimed,
-        'traceback': None,
-        'inside': inside,
-        'outside': None,
-    } | more
+    return {**of, **said, 'claimed': claimed, 'inside': inside, 'outside': None, **more}
 
 
 def test_goals_are_reached_by_what_is_good_and_missed_by_what_is_not():

@@ -268,15 +268,8 @@ def calibration():
         for family, key, size in families
         for joint in robot.joint_names
     ]
-    true.append(
-        {
-            'effect': 'transmission_ripple',
-            'joint': robot.joint_names[1],
-            'amplitude': [2e-4, 1e-4],
-            'order': [1.0, 40.0],
-            'phase': [0.3, -1.0],
-        }
-    )
+    waves = {'amplitude': [2e-4, 1e-4], 'order': [1.0, 40.0], 'phase': [0.3, -1.0]}
+    true.append({'effect': 'transmission_ripple', 'joint': robot.joint_names[1], **waves})
     true.append({'effect': 'tool_pose', 'xyz': [2e-4, -1e-4, 5e-4], 'rotvec': [0, 0, 1e-3]})
     return diagnosis('identified', robot, true, true, [stations(robot)])
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import TwinError
+from weld_twin_core import TwinError, catalog
 from weld_twin_lab.campaigns.message_packages import messages_importable
 
 HERE = Path(__file__).parent

@@ -490,9 +490,16 @@ def asking(drawn: Sequence[Place]) -> list[str]:
 
 @functools.cache
 def imports(file: Path, module: str) -> bool:
-    """Return whether a file of tests imports a module."""
+    """Return whether a file of tests imports a module, or what it holds as a name of the package."""
     text, (room, _, name) = file.read_text(encoding='utf-8'), module.rpartition('.')
-    return f'{module} ' in text or f'{room} import {name}' in text
+    package = importlib.import_module(module.partition('.')[0])
+    lines = re.findall(rf'^from {package.__name__} import (.+)$', text, re.MULTILINE)
+    public = (getattr(package, each, None) for line in lines for each in line.split(', '))
+    return (
+        f'{module} ' in text
+        or f'{room} import {name}' in text
+        or any(getattr(each, '__module__', '') == module for each in public)
+    )
 
 
 def files_for(place: Place) -> set[Path]:

@@ -13,10 +13,9 @@ from measured_cells import asked, moving, recorded, stations
 from small_arm import small_arm
 
 import weld_twin_core as wt
-from weld_twin_core.arm import catalog
+from weld_twin_core import DataError, catalog
 from weld_twin_core.diagnosis.advice import next_experiment
 from weld_twin_core.diagnosis.algebra.problem import Scale
-from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.robots import write_robot_yaml

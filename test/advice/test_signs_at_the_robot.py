@@ -13,10 +13,9 @@ import re
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import effects_from_list, load
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.effects import effects_from_list
 from weld_twin_lab.programs.plain import tool_pose
 from weld_twin_nodes.offline.exports import write_offsets
 from weld_twin_report.report.controllers import correction

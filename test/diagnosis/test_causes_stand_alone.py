@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, all_but, recorded, sites, solved
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import View, diagnose, load
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.diagnosis.unseen.folds import posture_regions
 from weld_twin_core.effects.gear_ratio import JointCoupling
-from weld_twin_core.effects.view import View
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 ARM = 'kuka_kr6_r900'

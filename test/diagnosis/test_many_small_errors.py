@@ -8,18 +8,15 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, recorded, sites, tiny
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import Beliefs, Twin, diagnose, load
 from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Evidence
 from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import _Case, weighed_families
 from weld_twin_core.diagnosis.result import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import decide
-from weld_twin_core.twin.twin import Twin
 
 
 def ripple(joint, order, amplitude=0.0, phase=0.0):

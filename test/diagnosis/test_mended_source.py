@@ -13,8 +13,7 @@ import pytest
 from command_line import done
 from diagnosis_cells import all_but
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core import JointMotion, Measurements, Recording, load
 from weld_twin_lab.programs.plain import tool_pose
 from weld_twin_msgs_py.bags import read_recording, write_recording
 from weld_twin_msgs_py.messages.topics import TopicNames

@@ -10,9 +10,7 @@ import pytest
 from command_line import done
 from diagnosis_cells import all_but, recorded
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core import JointMotion, Measurements, Recording, diagnose, load
 from weld_twin_lab.blind.blind_cell import as_recording
 from weld_twin_lab.plant.exponentials import Command
 from weld_twin_lab.plant.plant import run

@@ -16,12 +16,10 @@ import yaml
 from command_line import done
 from diagnosis_cells import all_but
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import Drift, InstrumentKnock, JointCompliance, JointSlip, ToolSlip
 from weld_twin_core.effects.dated import from_now_on
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.programs.plain import _frames, tool_pose
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis

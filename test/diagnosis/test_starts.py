@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from diagnosis_cells import HOME, all_but, effect, known_scale, tiny
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import Beliefs, JointMotion, Measurements, Recording, Twin, diagnose, load
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.algebra.starts import started
 from weld_twin_core.diagnosis.algebra.workspace import Workspace
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 
 
 @pytest.mark.parametrize('frequency', [3.0, 9.0])

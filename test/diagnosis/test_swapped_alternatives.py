@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from diagnosis_cells import effect, tiny
 
+from weld_twin_core import Beliefs, JointMotion, Measurements, Recording, Twin
 from weld_twin_core.diagnosis import pipeline
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.algebra.workspace import Part, Role, ranking
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.evidence import Alternative
 from weld_twin_core.diagnosis.hypotheses import alternatives, search
 from weld_twin_core.diagnosis.hypotheses.other_sets import Other, Sets, reconsidered
 from weld_twin_core.diagnosis.hypotheses.selection import implausible
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects.plausible import beyond
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 
 TRUE = (
     effect('joint_offset', joint='elbow_joint', offset=6e-4),

@@ -10,17 +10,13 @@ from diagnosis_cells import SIGMA, effect, known_scale, recorded, sites, tiny
 from scipy.spatial.transform import Rotation
 from small_arm import small_arm
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import Beliefs, DataError, JointMotion, Measurements, Recording, diagnose, load
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.algebra.workspace import Role
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.unseen.where import structure
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 
 def with_bend(size):

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import REGISTRY, Effect, JointOffset, effects_from_list
+from weld_twin_core import Effect, Robot, Twin, effects_from_list
+from weld_twin_core.effects import REGISTRY, JointOffset
 from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
 from weld_twin_core.effects.registry import ELSE, way
-from weld_twin_core.twin.twin import Twin
 
 DOCS = Path(__file__).parents[2] / 'docs'
 sys.path.append(str(DOCS / '_ext'))

@@ -12,8 +12,7 @@ import pytest
 from command_line import done, refused, weld_twin
 from diagnosis_cells import all_but
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core import JointMotion, Measurements, Recording, load
 from weld_twin_lab.programs import plain as readers
 from weld_twin_lab.programs.plain import along, driven, tool_pose
 from weld_twin_msgs_py.bags import write_recording

@@ -15,9 +15,7 @@ import pytest
 from command_line import done
 from served import Person, Server, fill, small_disk, until
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core import JointMotion, Recording, Twin, load
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_report.history import Database
 from weld_twin_report.serve import Settings

@@ -23,11 +23,8 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.action import ActionClient
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import JointMotion, Robot, forward, load
 from weld_twin_core.motion.inverse.newton import polish
-from weld_twin_core.recording import JointMotion
 from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict

@@ -22,9 +22,7 @@ from participants import participant, placed
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, forward, load
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE

@@ -20,8 +20,7 @@ from participants import participant, placed
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import forward, load
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE

@@ -4,8 +4,7 @@
 
 from functools import cache
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, load
 
 
 @cache

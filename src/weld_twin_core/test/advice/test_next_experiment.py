@@ -11,15 +11,12 @@ import pytest
 from measured_cells import asked, moving, recorded, stations
 
 import weld_twin_core as wt
-from weld_twin_core.arm import catalog
+from weld_twin_core import DataError, JointMotion, Recording, Signal, catalog, effects_from_list
 from weld_twin_core.arm.clearance import Space
 from weld_twin_core.diagnosis.advice import Limits, chosen_pieces, experiment, next_experiment
 from weld_twin_core.diagnosis.advice.candidates import candidates
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
-from weld_twin_core.effects import effects_from_list
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Recording, Signal
 
 NOISE = 2e-5
 

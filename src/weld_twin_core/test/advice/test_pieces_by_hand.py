@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, Measurements, Recording, Signal, load
 from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, _alone, candidates
 from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns, _longer
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
@@ -18,7 +18,6 @@ from weld_twin_core.diagnosis.advice.separation import Parting, _ahead, _remaind
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.answer.next_step import _in_place, _promise
 from weld_twin_core.effects import Backlash, JointCompliance, JointOffset
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
 
 @pytest.fixture

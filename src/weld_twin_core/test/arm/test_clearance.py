@@ -5,9 +5,8 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
+from weld_twin_core import Robot, catalog
 from weld_twin_core.arm.clearance import Space, _clearances, body
-from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import transform
 
 UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core import DataError, JointMotion, Recording
 from weld_twin_core.bundle import adjusted, seen_by
 from weld_twin_core.cameras import Camera, Lens, Sightings, Target
 from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.soundness import images as soundness_of_images
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Recording
 
 FOCAL, CENTRE = 1500.0, np.array([900.0, 600.0])
 BOARD = np.array([[c, r, 0.0] for r in range(4) for c in range(6)]) * 0.03

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core import Measurements
+from weld_twin_core import DataError, Measurements
 from weld_twin_core.cameras import Lens
-from weld_twin_core.errors import DataError
 from weld_twin_core.pose_noise import PoseNoise, alike, positive
 
 LENS = Lens([812.0, 803.0], [331.0, 236.0], [-0.12, 0.07, 8e-4, -5e-4, 0.01])

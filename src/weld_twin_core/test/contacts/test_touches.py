@@ -9,14 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
+from weld_twin_core import Beliefs, DataError
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, places, spreads
 from weld_twin_core.diagnosis.algebra.fit import design, fit
 from weld_twin_core.diagnosis.algebra.problem import Scale
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import _tool_point, aligned
 from weld_twin_core.diagnosis.unseen import where
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import reaching
 
 SIGMA = 1e-4

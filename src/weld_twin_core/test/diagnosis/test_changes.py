@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
+from weld_twin_core import Beliefs, ModelError
 from weld_twin_core.diagnosis.algebra.fit import robust_scale
 from weld_twin_core.diagnosis.algebra.problem import Change, Problem
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.frames.changes import (
     _evidence,
@@ -18,7 +18,6 @@ from weld_twin_core.diagnosis.frames.changes import (
     with_changes,
 )
 from weld_twin_core.effects import REGISTRY, Backlash, JointOffset, LinkTwist, ToolPose
-from weld_twin_core.errors import ModelError
 
 NOISE = 3e-5
 COMMON = (JointOffset('elbow_joint', 8e-4), LinkTwist('shoulder_lift_joint', 6e-4))

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
+from weld_twin_core import Signal, effect_from_mapping
 from weld_twin_core.diagnosis.algebra.definite import outside, span_of
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.unseen.groups import GAPS, all_groups
-from weld_twin_core.effects import effect_from_mapping
-from weld_twin_core.recording import Signal
 
 ROBOT = wt.load('ur5')
 SPRING = wt.effects.JointCompliance('shoulder_lift_joint', compliance=1e-5)

@@ -5,12 +5,10 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import DataError, catalog, forward
 from weld_twin_core.diagnosis.predicting.allowed import Conditioning, dispersion
 from weld_twin_core.diagnosis.predicting.planned import plan_stations
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows
-from weld_twin_core.errors import DataError
 
 ROBOT = catalog.load('ur5')
 

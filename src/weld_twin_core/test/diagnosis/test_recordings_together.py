@@ -7,9 +7,9 @@ import pytest
 from small_arm import small_arm
 
 import weld_twin_core as wt
+from weld_twin_core import Beliefs, JointMotion, Measurements, Recording, Signal, Twin
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.algebra.workspace import Role
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
 from weld_twin_core.diagnosis.many.small_errors import _everything
 from weld_twin_core.diagnosis.result import Site
@@ -17,8 +17,6 @@ from weld_twin_core.diagnosis.soundness.richness import with_temperatures
 from weld_twin_core.diagnosis.unseen.folds import posture_regions
 from weld_twin_core.diagnosis.unseen.groups import all_groups
 from weld_twin_core.effects import REGISTRY, Backlash, GearRatio, LinkLength
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_core.twin.twin import Twin
 
 ELBOW = small_arm().joint_names[2]
 

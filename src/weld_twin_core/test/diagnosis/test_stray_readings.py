@@ -10,15 +10,12 @@ from scipy.optimize import lsq_linear
 from small_arm import small_arm
 
 import weld_twin_core as wt
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import JointMotion, Measurements, Recording, Twin, diagnose, load
 from weld_twin_core.diagnosis.algebra.fit import trusted
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.levels.gathered import _shared_out, scatter
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects import LinkLength
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 
 
 @pytest.mark.parametrize(('count', 'strays', 'left_out'), [(70, 1, 1), (70, 5, 1), (200, 5, 4)])

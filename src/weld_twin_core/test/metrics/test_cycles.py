@@ -7,12 +7,10 @@ import statistics
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, JointMotion, Measurements, Recording, Robot
 from weld_twin_core.metrics.circle import circle_of
 from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
 from weld_twin_core.metrics.performance import path_cycles, performance_of, pose_cycles, stops
-from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 TURNTABLE = Robot.from_mapping({'name': 'turntable', 'joints': [{'name': 'turn', 'a': 1.0}]})
 """One joint whose tool goes round at a metre."""

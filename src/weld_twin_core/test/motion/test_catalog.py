@@ -11,10 +11,7 @@ import pytest
 from drawn_robots import pinocchio_model
 from source_chains import CHAINS, chain_poses
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward, jacobian
-from weld_twin_core.arm.dynamics import gravity_torque
-from weld_twin_core.errors import ModelError
+from weld_twin_core import ModelError, catalog, forward, gravity_torque, jacobian
 
 UR = 'ur_description/urdf'
 URDFS = {

@@ -10,11 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward, jacobian
+from weld_twin_core import ReachError, catalog, forward, jacobian, solve, solve_path
 from weld_twin_core.arm.rotation import angle_between
-from weld_twin_core.errors import ReachError
-from weld_twin_core.motion.inverse import family, polish, solve, solve_path
+from weld_twin_core.motion.inverse import family, polish
 from weld_twin_core.motion.inverse.along_path import jumps
 from weld_twin_core.motion.inverse.following import follow
 from weld_twin_core.motion.paths import Line, Polyline, Torch

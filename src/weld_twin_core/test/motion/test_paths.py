@@ -8,9 +8,7 @@ import yaml
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import PathError
-from weld_twin_core.motion.inverse import solve_path
+from weld_twin_core import PathError, catalog, default_seam, solve_path
 from weld_twin_core.motion.paths import (
     KINDS,
     Arc,
@@ -20,7 +18,6 @@ from weld_twin_core.motion.paths import (
     Spline,
     Torch,
     Weave,
-    default_seam,
     from_mapping,
 )
 

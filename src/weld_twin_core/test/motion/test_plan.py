@@ -10,11 +10,8 @@ import pytest
 from drawn_robots import pinocchio_model
 from scipy.integrate import cumulative_trapezoid, quad
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.errors import PathError
-from weld_twin_core.motion.paths import KINDS, Torch, Weave, default_seam
-from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core import PathError, catalog, default_seam, forward, plan
+from weld_twin_core.motion.paths import KINDS, Torch, Weave
 from weld_twin_core.motion.profiles import (
     PROFILES,
     Aggressive,

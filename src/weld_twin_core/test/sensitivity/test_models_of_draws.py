@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from weld_twin_core import DataError, ModelError, default_seam
 from weld_twin_core.effects import associative_scan
 from weld_twin_core.effects.backlash import Backlash
 from weld_twin_core.effects.geometry import JointOffset
-from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.sensitivity import (
     Distribution,
     Outcomes,

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from weld_twin_core import JointMotion, Measurements, Recording, Twin
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 
 
 def moving(robot, rng, seconds=20.0, rate=125.0, size=0.4):

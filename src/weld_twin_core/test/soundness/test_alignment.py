@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from measured_cells import anywhere, asked, moving, recorded, remeasured, stations
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import catalog, load
 from weld_twin_core.arm.rotation import nearest_rotation, rotation_matrix
 from weld_twin_core.diagnosis.frames.alignment import LEVER, Track, initial_frames
 from weld_twin_core.diagnosis.soundness.efforts import _fitted, compared

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from measured_cells import asked, moving, recorded, rejointed, stations
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import DataError, JointMotion, Recording, load
 from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.algebra.definite import outside, span_of
 from weld_twin_core.diagnosis.soundness.computed import _gap
@@ -34,8 +34,6 @@ from weld_twin_core.diagnosis.soundness.stuck import _inside
 from weld_twin_core.diagnosis.soundness.suspicions import doubles, suspicions, turned_bases
 from weld_twin_core.diagnosis.soundness.touches import _moved_run
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.features import with_expected_effort
 
 ELBOW = np.array([1.0, 1.0, np.degrees(1.0), 1.0, 1.0, 1.0])

@@ -15,12 +15,11 @@ import pytest
 from measured_cells import anywhere, moving, recorded, rejointed, remeasured, stations
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, effects_from_list, load
 from weld_twin_core.arm.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.mending import Given
-from weld_twin_core.effects import JointCoupling, effects_from_list
-from weld_twin_core.recording import JointMotion
+from weld_twin_core.effects import JointCoupling
 
 UR5 = load('ur5')
 BOTH, NONE = ('base', 'tool'), ()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from measured_cells import anywhere, moving, recorded, stations
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import ModelError, load
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.frames.alignment import TOGETHER
 from weld_twin_core.diagnosis.soundness import mending
@@ -19,7 +19,6 @@ from weld_twin_core.diagnosis.soundness.mending import Given, as_entry, replayed
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, rough_models, snapshot
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions
 from weld_twin_core.effects import JointOffset
-from weld_twin_core.errors import ModelError
 
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 MADE = {

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from measured_cells import asked, moving, recorded, rejointed, stations
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.diagnosis import diagnose
+from weld_twin_core import JointMotion, catalog, diagnose
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.soundness import mixups as mix_ups
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
@@ -34,7 +33,6 @@ from weld_twin_core.diagnosis.soundness.suspicions import suspicions
 from weld_twin_core.effects import JointCompliance, JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
 from weld_twin_core.effects.geometry import LinkLength, LinkOffset, LinkTwist, ToolPose
-from weld_twin_core.recording import JointMotion
 
 ELBOW_TURNED = [1, 1, -1, 1, 1, 1]
 

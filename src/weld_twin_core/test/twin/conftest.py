@@ -13,9 +13,7 @@ import pytest
 from drawn_robots import random_robot
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.recording import JointMotion, Recording, Signal
+from weld_twin_core import JointMotion, Recording, Robot, Signal, load
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies beside the tests can be imported
 

@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, Measurements, Recording, Signal, Twin, compensate, load
 from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.motion.inverse.newton import reaching
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
-from weld_twin_core.twin.compensation import compensate
 from weld_twin_core.twin.domain import Domain
-from weld_twin_core.twin.twin import Twin
 
 UR5 = load('ur5')
 

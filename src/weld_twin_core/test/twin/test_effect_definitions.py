@@ -12,12 +12,10 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from usual_effects import OF_CELLS, bundled
 
+from weld_twin_core import JointMotion, ModelError, Recording, Twin, effect_from_mapping
 from weld_twin_core.arm.controller_frames import ControllerFrames
-from weld_twin_core.effects import REGISTRY, effect_from_mapping
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.hooks import highest_order
-from weld_twin_core.errors import ModelError
-from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.twin import Twin
 
 
 @dataclass

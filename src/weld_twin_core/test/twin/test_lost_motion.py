@@ -11,18 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import (
-    Friction,
-    GearRatioByDirection,
-    Hysteresis,
+from weld_twin_core import (
+    JointMotion,
+    ModelError,
+    Recording,
+    Robot,
+    Twin,
+    catalog,
     effect_from_mapping,
     effects_from_list,
 )
-from weld_twin_core.errors import ModelError
-from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core.effects import Friction, GearRatioByDirection, Hysteresis
 
 
 def under(arm, effect, recording):

@@ -10,10 +10,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, Poses
 from weld_twin_core.metrics import deviation, iso9283
 from weld_twin_core.motion import seam_frame
-from weld_twin_core.twin.poses import Poses
 
 NOMINAL = np.array([[0.0, 0, 0], [0.3, 0, 0], [0.3, 0.4, 0]])
 OFF = np.array([[3e-3, 4e-3, 0], [0, 0, 0], [0, 0, -1e-3]])

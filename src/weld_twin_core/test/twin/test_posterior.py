@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import DataError, JointMotion, ModelError, Recording, Robot, Twin, load
 from weld_twin_core.diagnosis.predicting.allowed import elsewhere
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.effects import REGISTRY, Quantization, ToolSlip
-from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features, shown
 from weld_twin_core.twin.posterior import Posterior, expected_poses, pose_covariances
-from weld_twin_core.twin.twin import Twin
 
 
 def motion(robot, count=5, seed=1):

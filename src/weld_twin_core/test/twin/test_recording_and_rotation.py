@@ -11,11 +11,9 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from scipy.stats.qmc import Halton
 
-from weld_twin_core.arm import rotation
+from weld_twin_core import DataError, JointMotion, Measurements, Recording, Signal, rotation
 from weld_twin_core.arrays import halton
 from weld_twin_core.cubics import hermite, natural_slopes, slopes_of_many
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
 vectors = st.tuples(*[st.floats(-1.7, 1.7)] * 3).map(np.array)
 

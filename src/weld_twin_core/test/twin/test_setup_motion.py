@@ -7,28 +7,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
-from weld_twin_core.diagnosis.unseen.held_out_shrink import _for_bag
-from weld_twin_core.effects import (
-    REGISTRY,
+from weld_twin_core import (
     Effect,
+    JointMotion,
+    Measurements,
+    ModelError,
     Parameter,
-    Plausible,
+    Recording,
+    Robot,
     Stage,
-    ToolPose,
-    ToolSlip,
+    Twin,
+    catalog,
     effect_from_mapping,
     effects_from_list,
     register,
 )
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
+from weld_twin_core.diagnosis.unseen.held_out_shrink import _for_bag
+from weld_twin_core.effects import REGISTRY, Plausible, ToolPose, ToolSlip
 from weld_twin_core.effects.dated import in_use, of_the_robot, seen_from
 from weld_twin_core.effects.loads import mass_range
 from weld_twin_core.effects.plausible import beyond, plausible, ranges, spreads, table
-from weld_twin_core.errors import ModelError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 
 SECOND = 1_000_000_000
 ROBOT = catalog.load('ur10')

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import JointMotion, Measurements, Recording, effect_from_mapping, forward, load
 from weld_twin_core.diagnosis.algebra.fit import effect_precision, fit, robust_scale
 from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.predicting.allowed import allowed
-from weld_twin_core.effects import JointOffset, effect_from_mapping
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.effects import JointOffset
 from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features

@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from usual_effects import usual
 
-from weld_twin_core.effects import REGISTRY, Effect, Stage, effect_from_mapping
-from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core import Effect, JointMotion, Recording, Stage, Twin, effect_from_mapping
+from weld_twin_core.effects import REGISTRY
 
 CLOCKS = ('time_delay', 'clock_rate')
 WITHOUT = {'quantization', 'measurement_noise'}

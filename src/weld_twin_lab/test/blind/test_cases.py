@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, catalog
 from weld_twin_lab.blind.blind_cell import motion
 from weld_twin_lab.blind.cause_sizes import (
     CONSTRUCTIONS,

@@ -4,8 +4,7 @@
 
 import numpy as np
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import PathError
+from weld_twin_core import PathError, catalog
 from weld_twin_lab.blind import blind_cell
 
 SPAN, RATE = 20.0, 50.0

@@ -8,13 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core import JointMotion, Recording, Twin, forward, load
 from weld_twin_core.twin.goal_correction import corrected_goal
 from weld_twin_core.twin.goal_motion import course
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.campaigns.compensator import (
     IN_A_CELL,
     counted,

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import DataError, ModelError, PathError, TwinError
+from weld_twin_core import DataError, ModelError, PathError, TwinError, catalog
 from weld_twin_lab.campaigns import fuzz
 from weld_twin_lab.campaigns.broken_files import targets
 from weld_twin_lab.campaigns.fuzz import harms, try_one

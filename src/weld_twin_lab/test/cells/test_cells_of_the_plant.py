@@ -5,8 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core import forward
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, forward
 from weld_twin_lab.cells.study import (
     KINDS,
     beyond_frames,

@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core import DataError, JointMotion, Measurements, Recording, Signal, forward, load
 from weld_twin_lab.contest.course import (
     ContestAnswer,
     commands,

@@ -5,8 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, load
 from weld_twin_lab.experiments.study import page, summary
 
 

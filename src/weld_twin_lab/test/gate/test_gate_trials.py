@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import Twin, forward
 from weld_twin_core.diagnosis.result import MISTAKES
-from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.gate import mistakes
 from weld_twin_lab.gate.mistakes import KINDS, MOVING_ONLY, Hidden
 from weld_twin_lab.gate.trials import result

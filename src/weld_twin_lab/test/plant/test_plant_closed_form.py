@@ -9,9 +9,8 @@ import pytest
 from plant_cells import EXACT, ROBOTS, UR5, dh_pose, dh_positions, record, stations, weave
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.effects import REGISTRY, effects_from_list
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core import Twin, catalog, effects_from_list
+from weld_twin_core.effects import REGISTRY
 from weld_twin_lab.blind import blind_cell
 from weld_twin_lab.blind.blind_cell import (
     BlindCell,

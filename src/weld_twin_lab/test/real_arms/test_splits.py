@@ -9,13 +9,9 @@ import pytest
 from scipy.io import savemat
 
 import weld_twin_core as wt
-from weld_twin_core import effects
-from weld_twin_core.arm import catalog
+from weld_twin_core import DataError, JointMotion, Measurements, Recording, Twin, catalog, effects
 from weld_twin_core.diagnosis.calibration.calibrated import Statement
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.coverage.others import postures_at
 from weld_twin_lab.real_arms.borne_out import borne_out
 from weld_twin_lab.real_arms.poor import measures, paired, plain_axis

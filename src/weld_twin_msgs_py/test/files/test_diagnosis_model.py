@@ -7,9 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core import DataError, JointMotion, Measurements, ModelError, Recording, catalog
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis, read_model
 from weld_twin_msgs_py.files.instruments import instrument, measured_by
 

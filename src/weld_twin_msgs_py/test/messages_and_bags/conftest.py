@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import JointMotion, Measurements, Recording, Robot, Signal
 from weld_twin_core.arm.rotation import rotation_matrix
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core import DataError, JointMotion, Measurements, Recording
 from weld_twin_msgs_py.bags import (
     BagReader,
     BagWriter,

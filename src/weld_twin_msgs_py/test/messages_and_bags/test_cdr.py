@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion
+from weld_twin_core import DataError, JointMotion
 from weld_twin_msgs_py.assembly import Intake, Role
 from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recording, write_recording
 from weld_twin_msgs_py.bags.from_bag import Stream, fill_regular

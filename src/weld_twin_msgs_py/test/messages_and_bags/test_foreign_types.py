@@ -7,11 +7,9 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import DataError, ModelError, forward, load
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.cameras import Camera, Lens
-from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.bags import bag_info, read_recording
 from weld_twin_msgs_py.messages.topics import TopicNames
 from weld_twin_msgs_py.tables import read_target

@@ -5,10 +5,8 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import DataError, Robot, catalog
 from weld_twin_core.bursts import ONE_CLOCK
-from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagWriter, bag_info, read_recording, write_recording
 from weld_twin_msgs_py.bags.needed import COMPLETENESS, Ends, never_recorded, uneven_ends
 from weld_twin_msgs_py.messages.to_messages import bag_messages

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, load
 from weld_twin_core.recording import JointSignal
 from weld_twin_msgs_py.assembly.joint_states import JointStates
 from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recording, write_recording

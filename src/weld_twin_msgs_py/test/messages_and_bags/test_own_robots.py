@@ -8,9 +8,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.errors import ModelError
+from weld_twin_core import ModelError, catalog, forward
 from weld_twin_msgs_py.robots import load_robot, own_files, read_robot_yaml, robot_names
 
 SCARA = """# two links in a plane, and a quill

@@ -7,8 +7,7 @@ import pytest
 from by_pinocchio import by_pinocchio
 
 import weld_twin_core as wt
-from weld_twin_core.errors import ModelError
-from weld_twin_core.twin.compensation import corrected
+from weld_twin_core import ModelError, corrected
 from weld_twin_msgs_py.robots import load_robot, read_urdf, write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 

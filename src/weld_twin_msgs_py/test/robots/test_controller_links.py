@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.chain import forward, frames
+from weld_twin_core import ModelError, corrected, default_seam, effect_from_mapping, forward
+from weld_twin_core.arm.chain import frames
 from weld_twin_core.arm.dynamics import payload_torque, wrench_torque
 from weld_twin_core.diagnosis.advice import actions
-from weld_twin_core.effects import effect_from_mapping
-from weld_twin_core.errors import ModelError
-from weld_twin_core.motion.paths import default_seam
-from weld_twin_core.twin.compensation import corrected
 from weld_twin_msgs_py.robots import load_robot, write_robot_yaml, write_urdf
 from weld_twin_msgs_py.robots.urdf_write import GivenUrdf, write_urdf_like
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core import load
+from weld_twin_core import DataError, TwinError, load
 from weld_twin_core.contacts import Artefact, Contact, Tie
-from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags import read_recording, write_recording
 from weld_twin_msgs_py.tables import (
     read_camera,

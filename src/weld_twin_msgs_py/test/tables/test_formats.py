@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import DataError, catalog, forward
 from weld_twin_core.arm.rotation import quaternion_from_matrix
-from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.tables import TableOptions, read_two_tables
 from weld_twin_msgs_py.tables.formats import forms
 

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, catalog, forward
 from weld_twin_msgs_py.tables import TableOptions, read_contacts, read_table
 
 UR5 = catalog.load('ur5')

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, Robot, catalog, forward
 from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.tables import TableOptions, read_table, read_two_tables
 

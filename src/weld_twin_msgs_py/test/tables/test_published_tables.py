@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, catalog, diagnose
 from weld_twin_msgs_py.bags import read_recording, write_recording
 from weld_twin_msgs_py.tables import TableOptions, read_table
 

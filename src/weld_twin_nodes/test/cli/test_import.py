@@ -11,8 +11,7 @@ import pytest
 from command_line import done, refused, weld_twin
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import catalog, forward
 from weld_twin_msgs_py.bags import read_recording
 
 ROBOT = catalog.load('ur5')

@@ -11,11 +11,9 @@ import pytest
 import yaml
 from command_line import done, refused
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, TwinError, catalog, effects_from_list
 from weld_twin_core.contacts import Artefact
-from weld_twin_core.effects import REGISTRY, effects_from_list
-from weld_twin_core.errors import TwinError
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.motion.paths import Torch, from_mapping
 
 jsonschema = pytest.importorskip('jsonschema', reason='needs a checker of JSON Schema')

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from command_line import done, refused, weld_twin
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import catalog, forward
 from weld_twin_msgs_py.bags import BagReader, provenance, read_recording
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.robots import load_robot, write_robot_yaml

@@ -6,8 +6,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, catalog
 
 
 @pytest.fixture(scope='session')

@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import Twin, forward
 from weld_twin_core.recording import Counted
-from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE, TWIN_POSE
 from weld_twin_nodes.harness import Cell

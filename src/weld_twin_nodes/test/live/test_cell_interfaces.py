@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.recording import JointMotion
+from weld_twin_core import JointMotion, forward, load
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (
     JOINT_STATES,

@@ -5,10 +5,8 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import ModelError, forward, load
 from weld_twin_core.arm.rotation import quaternion_from_matrix, rotation_matrix, transform
-from weld_twin_core.errors import ModelError
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import MEASURED_POINT, MEASURED_POSE, TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.harness.cell import HealthListener

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.errors import DataError
+from weld_twin_core import DataError, load
 from weld_twin_msgs_py.assembly.joint_states import JointStates
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import BY_NAME

@@ -9,9 +9,7 @@ from participants import participant
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.recording import JointMotion
+from weld_twin_core import JointMotion, forward, load
 from weld_twin_msgs_py.bags import BagReader, read_recording
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.errors import DataError
-from weld_twin_core.metrics.deviation import RunningMetrics, deviation_metrics
+from weld_twin_core import DataError, deviation_metrics, load
+from weld_twin_core.metrics.deviation import RunningMetrics
 from weld_twin_msgs_py.assembly.intake import RESTART_AFTER, Forward
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import MEASURED_POSE, TWIN_BASE, TWIN_POSE

@@ -7,9 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
-from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core import effect_from_mapping, forward, load
 from weld_twin_core.twin.goal_correction import GoalLimits
 from weld_twin_core.twin.pose_correction import PoseCorrection, between
 from weld_twin_core.twin.program_model import ProgramModel

@@ -13,9 +13,7 @@ from recorder_words import numbers
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion
+from weld_twin_core import DataError, JointMotion, catalog
 from weld_twin_msgs_py.bags import recover
 
 pytestmark = pytest.mark.cells

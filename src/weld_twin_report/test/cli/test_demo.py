@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from command_line import refused
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.twin.twin import Twin
+from weld_twin_core import Twin, catalog
 from weld_twin_msgs_py.bags import provenance, read_recording
 
 pytest.importorskip('rclpy', reason='needs ROS 2')

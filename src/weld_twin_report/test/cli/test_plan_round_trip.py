@@ -10,8 +10,7 @@ import pytest
 import yaml
 from command_line import done, refused
 
-from weld_twin_core.arm import catalog
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import catalog, forward
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.joint_file import read_joint_motion, through_stations
 from weld_twin_msgs_py.robots import load_robot, read_urdf, write_urdf

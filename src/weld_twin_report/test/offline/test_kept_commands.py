@@ -16,9 +16,7 @@ import numpy as np
 import pytest
 from page_text import flat, page_text
 
-from weld_twin_core import __version__
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.chain import forward
+from weld_twin_core import __version__, forward, load
 from weld_twin_core.twin.directions import Directions, Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Posterior, as_dict

@@ -11,8 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core import effect_from_mapping, load
 from weld_twin_core.twin.directions import Directions
 from weld_twin_report.report.charts import Axis, Line, chart, curve_figure, embedded, thinned
 from weld_twin_report.report.html import document

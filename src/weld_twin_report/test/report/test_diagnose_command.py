@@ -12,11 +12,9 @@ import yaml
 from command_line import done, refused
 from scipy.stats import chi2
 
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, Recording, Twin, load
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.effects import Backlash
-from weld_twin_core.recording import JointMotion, Recording
-from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import BagReader, provenance, read_recording, write_recording
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf

@@ -19,11 +19,8 @@ import pytest
 from page_text import flat, page_text
 from rich.console import Console
 
-from weld_twin_core import __version__
-from weld_twin_core.arm.catalog import load
+from weld_twin_core import JointMotion, __version__, effect_from_mapping, load
 from weld_twin_core.diagnosis.result import Candidate, Check, Family, Found, Shares, Site
-from weld_twin_core.effects import effect_from_mapping
-from weld_twin_core.recording import JointMotion
 from weld_twin_nodes.wording import mending
 from weld_twin_nodes.wording.mending import remaining_without
 from weld_twin_report.report import print_summary, report_page, sections

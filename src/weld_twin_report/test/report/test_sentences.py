@@ -12,11 +12,10 @@ import pytest
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.robot import Robot
+from weld_twin_core import Robot, effect_from_mapping, load
 from weld_twin_core.diagnosis.result import Candidate, Site, Unexplained
 from weld_twin_core.diagnosis.verdict.decision import UNEVEN
-from weld_twin_core.effects import REGISTRY, effect_from_mapping
+from weld_twin_core.effects import REGISTRY
 from weld_twin_nodes.wording.quantities import (
     counted,
     in_short,

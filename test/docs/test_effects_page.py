@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The page on effects lists what the registry has, and its example runs."""
+"""The pages of effects and of plausible sizes list what there is, and their example runs."""
 
 import re
 import sys
@@ -13,12 +13,13 @@ import yaml
 from weld_twin_core import Effect, Robot, Twin, effects_from_list
 from weld_twin_core.effects import REGISTRY, JointOffset
 from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
+from weld_twin_core.effects.plausible import table
 from weld_twin_core.effects.registry import ELSE, way
 
 DOCS = Path(__file__).parents[2] / 'docs'
 sys.path.append(str(DOCS / '_ext'))
 
-from range_rows import effect_rows  # noqa: E402
+from range_rows import effect_rows, range_rows  # noqa: E402
 
 PAGE = (DOCS / 'effects.md').read_text(encoding='utf-8')
 BUNDLED = {k: kind for k, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
@@ -125,3 +126,18 @@ def test_the_example_of_an_own_effect_runs():
     np.testing.assert_allclose(
         pose.position, [0.6 * np.cos(lean), 0.0, -0.6 * np.sin(lean)], atol=1e-15
     )
+
+
+def test_the_page_of_plausible_sizes_lists_every_figure():
+    text = (DOCS / 'plausible.md').read_text(encoding='utf-8')
+    assert text.count('{weld-twin-ranges}') == 2
+    assert {row[:2] for row in range_rows(sliding=False)} == set(table())
+
+
+def test_a_row_of_it_says_unit_spread_range_and_source():
+    rows = {row[:2]: row[2:] for row in range_rows(sliding=True)}
+    assert rows['backlash', 'width'][:4] == ('m', '5e-05', '0', '0.005')
+    turning = {row[:2]: row[2:] for row in range_rows(sliding=False)}
+    assert turning['payload', 'mass'][:4] == ('kg', '2', 'by robot', 'by robot')
+    assert turning['vibration', 'frequency'][:4] == ('Hz', 'any', '1', '100')
+    assert 'industrialmonitordirect.com' in turning['joint_offset', 'offset'][4]

@@ -242,21 +242,33 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     robot = ('--robot', cell / 'robot.yaml')
     words = ('diagnose', tmp_path / 'rec', *robot, '--align', 'base', *ZEROS_ALONE)
     done(*words, '--out', tmp_path / 'found')
-    model = ('--model', tmp_path / 'found' / 'diagnosis.json')
+    model = ('--model', tmp_path / 'found' / 'diagnosis.json', '--tolerance', '0.5mm')
     said = done('correct', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
     assert 'frames were fitted to the recording (base)' in said
     meant, run = way_of(MADE), way_of(tmp_path / 'out')
     real = tool_pose(ROBOT, run.joints[::5], TOOL, off)[:, :3, 3]
     apart = np.linalg.norm(real[:, None] - meant.tool[None], axis=2).min(axis=1)
     true = np.sqrt((apart**2).mean())
-    after = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']['after']
+    entry = json.loads((tmp_path / 'out' / 'correction.json').read_text())
+    after = entry['expected']['after']
     assert after['rms_ci90_same_setup_m'][1] < true < after['rms_ci90_m'][1]
+    # Points that were taught with this arm lie in the base as it was fitted, zero and all.
+    found = json.loads((tmp_path / 'found' / 'diagnosis.json').read_text())
+    base = np.array(found['model']['bases'][0])
+    own, same = entry['tolerance']['after'], entry['tolerance']['after']['same_setup']
+    assert off_the_path(tmp_path / 'out', off, base) < same['sure_within_m'] < 5e-4
+    assert 5e-4 < true < own['sure_within_m']
+    assert (own['decision'], same['decision']) == ('not kept', 'kept')
+    assert said.index('it counts as not kept') < said.index('taught with this arm: 0%')
+    assert said.index('taught with this arm: 0%') < said.rindex('it counts as kept')
 
 
-def off_the_path(folder):
-    """Return how far the real tool is from the path that was meant, at its worst [m]."""
+def off_the_path(folder, off=OFF, base=None):
+    """Return how far the real tool is from the path that was meant in a base, at its worst [m]."""
     meant, run = way_of(MADE), way_of(folder)
-    real = tool_pose(ROBOT, run.joints[::5], TOOL, OFF)[:, :3, 3]
+    real = tool_pose(ROBOT, run.joints[::5], TOOL, off)[:, :3, 3]
+    if base is not None:
+        real = (real - base[:3, 3]) @ base[:3, :3]
     way = np.diff(meant.tool, axis=0)
     off = real[:, None] - meant.tool[:-1]
     share = (off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-18)

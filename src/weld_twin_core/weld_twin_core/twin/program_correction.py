@@ -455,17 +455,19 @@ class Accuracy(NamedTuple):
     worsts: Array | None = None
     """Largest distance under every model, by set-up and by the robot's own base, (2, D) [m]."""
 
-    def within(self, tolerance: float) -> float | None:
+    def within(self, tolerance: float, *, same_setup: bool = False) -> float | None:
         """Return the probability that the tool stays within a tolerance [m] all the way."""
         if self.worsts is None:
             return None
-        return float((self.worsts <= tolerance).mean(axis=1).min())
+        worsts = self.worsts[:1] if same_setup else self.worsts
+        return float((worsts <= tolerance).mean(axis=1).min())
 
-    def likely_within(self, probability: float) -> float | None:
+    def likely_within(self, probability: float, *, same_setup: bool = False) -> float | None:
         """Return the least tolerance [m] that is kept all the way with a probability."""
         if self.worsts is None:
             return None
-        return float(np.quantile(self.worsts, probability, axis=1).max())
+        worsts = self.worsts[:1] if same_setup else self.worsts
+        return float(np.quantile(worsts, probability, axis=1).max())
 
     @property
     def sure_within(self) -> float | None:

@@ -359,28 +359,40 @@ def tolerance_entry(
     for name, value in zip(('before', 'after'), made.accuracy, strict=True):
         if value is None or value.worsts is None:
             raise DataError('--tolerance needs a model that says how sure it is: a diagnosis.json')
-        probability = float(value.within(tolerance) or 0.0)
-        sides[name] = {
-            'probability': probability,
-            'decision': conforms(probability),
-            'sure_within_m': value.sure_within,
-        }
-    more = None
-    if sides['after']['decision'] != 'kept':
+        own, same = (_kept(value, tolerance, same_setup=same) for same in (False, True))
+        sides[name] = {**own, 'same_setup': same}
+    after, more = sides['after'], dict[bool, int]()
+    if after['decision'] != 'kept':
         more = _postures_more(made, model, tolerance, noise)
-    return {'tolerance_m': tolerance, **sides, 'postures_more': more}
+    if after['same_setup']['decision'] != 'kept':
+        after['same_setup']['postures_more'] = more.get(True)
+    return {'tolerance_m': tolerance, **sides, 'postures_more': more.get(False)}
+
+
+def _kept(value: Accuracy, tolerance: float, *, same_setup: bool) -> dict[str, Any]:
+    """Return how probably a tolerance is kept, in the set-up that was recorded or in all."""
+    probability = float(value.within(tolerance, same_setup=same_setup) or 0.0)
+    return {
+        'probability': probability,
+        'decision': conforms(probability),
+        'sure_within_m': value.likely_within(SURE, same_setup=same_setup),
+    }
 
 
 def _postures_more(
     made: CorrectedProgram, model: ProgramModel, tolerance: float, noise: float
-) -> int | None:
-    """Return how many postures measured along the program make it sure; None where none do."""
+) -> dict[bool, int]:
+    """
+    Return how many postures measured along the program make it sure.
+
+    In the set-up that was recorded (True), and in all (False); without those where no number does.
+    """
     assert model.posterior is not None
     q = np.concatenate([piece.motion.q for piece in made.correction.travel.pieces])
     postures = q[np.unique(np.linspace(0, len(q) - 1, min(OFFERED, len(q))).round().astype(int))]
     twin = model.twin(made.correction.travel.pieces[0].moves[0].tool)
     count = min(MORE[-1], len(postures))
-    wanted = Wanted(tolerance, noise)
+    wanted, out = Wanted(tolerance, noise), dict[bool, int]()
     stations = plan_more(model.posterior, twin, (postures, postures), count, wanted).q
     for number in MORE:
         if number > len(stations):
@@ -392,9 +404,13 @@ def _postures_more(
         )
         drawn = tuple(surer.drawn(look, look.motion) for look in made.correction.looks)
         _, after = along_seams(replace(made.correction, drawn=drawn))
-        if after is not None and (after.within(tolerance) or 0.0) >= SURE:
-            return number
-    return None
+        assert after is not None
+        for same in (True, False):
+            if (after.within(tolerance, same_setup=same) or 0.0) >= SURE:
+                out.setdefault(same, number)
+        if False in out:
+            break
+    return out
 
 
 DIGITS = 12

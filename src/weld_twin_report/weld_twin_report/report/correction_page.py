@@ -58,34 +58,53 @@ def headline(entry: Mapping[str, Any]) -> str:
     )
 
 
+_DECISIONS = {
+    'kept': 'it counts as kept',
+    'not kept': 'it counts as not kept',
+    'open': 'it counts neither as kept nor as not kept',
+}
+
+
 def tolerance_sentences(entry: Mapping[str, Any]) -> list[str]:
     """Return in sentences whether a tolerance is kept; nothing where none was asked for."""
     if 'tolerance' not in entry:
         return []
     tolerance = entry['tolerance']
-    size, after = f'{tolerance["tolerance_m"] * 1e3:.3g} mm', tolerance['after']
-    decision = {
-        'kept': 'it counts as kept',
-        'not kept': 'it counts as not kept',
-        'open': 'it counts neither as kept nor as not kept',
-    }[after['decision']]
+    size, before, after = (
+        f'{tolerance["tolerance_m"] * 1e3:.3g} mm',
+        tolerance['before'],
+        tolerance['after'],
+    )
     out = [
         f'All along, the tool keeps within {size} of where the program means it with '
-        f'{tolerance["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
-        f'after: {decision} (from 95 % on, with guard bands as ISO 14253-1). After, it is 95 % sure '
-        f'to keep within {after["sure_within_m"] * 1e3:.3f} mm.'
+        f'{before["probability"]:.0%} probability before and {after["probability"]:.0%} '
+        f'after: {_DECISIONS[after["decision"]]} (from 95 % on, with guard bands as ISO 14253-1). '
+        f'After, it is 95 % sure to keep within {after["sure_within_m"] * 1e3:.3f} mm.'
     ]
-    if after['decision'] == 'kept':
-        return out
-    more = tolerance['postures_more']
-    if more is None:
-        return [*out, 'No number of postures measured along it makes that sure with this model.']
-    return [
-        *out,
-        f'{more} postures measured more along it make it 95 % sure: weld-twin investigate '
-        f'--tolerance {tolerance["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
-        f'--postures {more} says which.',
-    ]
+    if after['decision'] != 'kept':
+        out.append(_more_measured(entry, tolerance['postures_more']))
+    same = after['same_setup']
+    if same['sure_within_m'] < after['sure_within_m']:
+        out.append(
+            'Of points in the frames that were fitted to the recording, as those that were taught with '
+            f'this arm: {before["same_setup"]["probability"]:.0%} before and '
+            f'{same["probability"]:.0%} after: {_DECISIONS[same["decision"]]}, and it is 95 % sure '
+            f'to keep within {same["sure_within_m"] * 1e3:.3f} mm.'
+        )
+        if same['decision'] != 'kept':
+            out.append(_more_measured(entry, same['postures_more']))
+    return out
+
+
+def _more_measured(entry: Mapping[str, Any], postures: int | None) -> str:
+    """Return in a sentence how many postures measured more make a tolerance sure."""
+    if postures is None:
+        return 'No number of postures measured along it makes that sure with this model.'
+    return (
+        f'{postures} postures measured more along it make it 95 % sure: weld-twin investigate '
+        f'--tolerance {entry["tolerance"]["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region '
+        f'{entry["program"]} --postures {postures} says which.'
+    )
 
 
 def _rms(accuracy: Mapping[str, Any]) -> str:
@@ -94,8 +113,12 @@ def _rms(accuracy: Mapping[str, Any]) -> str:
 
 
 def _ends(accuracy: Mapping[str, Any]) -> str:
-    ends = accuracy['rms_ci90_m']
-    return '' if ends is None else ' to '.join(f'{value * 1e3:.3f}' for value in ends)
+    """Return in which interval nine of ten lie [mm], and in which for points in fitted frames."""
+    ends, same = accuracy['rms_ci90_m'], accuracy['rms_ci90_same_setup_m']
+    if ends is None:
+        return ''
+    whole, fitted = (' to '.join(f'{value * 1e3:.3f}' for value in each) for each in (ends, same))
+    return whole if fitted == whole else f'{fitted} in the frames fitted, else {whole}'
 
 
 def _figures(entry: Mapping[str, Any]) -> Html:

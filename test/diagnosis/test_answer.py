@@ -100,10 +100,6 @@ def test_the_answer_has_every_key_of_the_public_schema_in_its_type(answer):
     assert faults(data, SCHEMA) == []
     assert data['schema'] == 'weld_twin/diagnosis/2'
     assert data['verdict']['status'] in ('identified', 'ambiguous', 'unknown', 'none')
-
-
-def test_the_answer_is_plain_json_without_infinities(answer):
-    data = answer.as_dict()
     assert json.loads(json.dumps(data, allow_nan=False)) == data
 
 
@@ -124,7 +120,7 @@ def test_every_effect_named_belongs_to_a_set_and_every_set_to_an_effect(answer):
     assert all(sum(site in group for group in groups) == 1 for site in named)
 
 
-def test_shares_of_joints_and_of_regimes_never_exceed_the_whole(answer):
+def test_joints_regimes_stretches_and_directions_share_out_the_gap(answer):
     joints = [share for _, share in answer.where.joints]
     regimes = list(answer.where.regimes.values())
     assert min(joints) >= 0.0 and min(regimes) >= 0.0
@@ -132,28 +128,19 @@ def test_shares_of_joints_and_of_regimes_never_exceed_the_whole(answer):
         assert sum(joints) <= 1.0 + 1e-9 and sum(regimes) <= 1.0 + 1e-9
     assert joints == sorted(joints, reverse=True)
     assert {name for name, _ in answer.where.joints} == set(answer.model.robot.joint_names)
-
-
-def test_stretches_of_the_path_share_out_the_whole_squared_gap(answer):
     path = np.array(answer.where.path)
     assert path[:, 2].sum() == pytest.approx(1.0)
     assert (path[:, 1] >= path[:, 0]).all() and (path[1:, 0] > path[:-1, 1]).all()
-
-
-def test_the_three_directions_add_up_to_the_gap_without_outliers(answer):
     parts = np.array(list(answer.where.direction.values()))
     residual = answer.traces.before[0][answer.traces.trusted[0]]
     assert (parts**2).sum() == pytest.approx((residual**2).sum(axis=1).mean(), rel=1e-6)
 
 
-def test_the_probabilities_of_every_effects_rivals_add_up_to_one(answer):
-    total = sum(c.probability for c in answer.candidates)
-    assert total == pytest.approx(round(total), abs=1e-9)
+def test_shares_of_causes_rest_and_noise_add_up_and_so_do_probabilities_of_rivals(answer):
+    every = sum(c.probability for c in answer.candidates)
+    assert every == pytest.approx(round(every), abs=1e-9)
     if answer.status != 'unknown':  # where curves took the names' place in the model
-        assert round(total) == len(answer.model.found)
-
-
-def test_shares_of_causes_rest_and_noise_add_up_to_the_squared_gap(answer):
+        assert round(every) == len(answer.model.found)
     shares = [cause.share for cause in answer.causes]
     assert shares == sorted(shares, reverse=True)
     # What is left without a name has an entry of its own, whose share is the unexplained.
@@ -184,12 +171,9 @@ def test_the_shrink_is_the_ratio_of_its_own_figures_inside_its_interval(answer):
     assert shrink.ratio == pytest.approx(shrink.rms_after_m / shrink.rms_before_m, rel=1e-9)
     assert shrink.ci95[0] <= shrink.ratio <= shrink.ci95[1]
     assert shrink.held_out == 'blocked cross-validation'
-
-
-def test_the_waterfall_ends_where_the_shrink_ends(answer):
-    if answer.model.found:
-        assert answer.shrink.steps[-1][1] == pytest.approx(answer.shrink.rms_after_m, rel=1e-9)
-        assert len(answer.shrink.alone) == len(answer.shrink.steps)
+    if answer.model.found:  # the waterfall ends where the shrink does
+        assert shrink.steps[-1][1] == pytest.approx(shrink.rms_after_m, rel=1e-9)
+        assert len(shrink.alone) == len(shrink.steps)
 
 
 @pytest.mark.parametrize(

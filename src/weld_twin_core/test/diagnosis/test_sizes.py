@@ -131,24 +131,23 @@ def equations(seed=3, members=12):
     return columns @ columns.T, columns @ residual, float(residual @ residual), ROWS
 
 
-@pytest.mark.parametrize('labels', [np.zeros(12, int), np.repeat([0, -1], 6)])
-def test_errors_that_nothing_is_known_of_are_learned_from_the_data_alone(labels):
+@pytest.mark.parametrize(
+    ('labels', 'scale', 'believed'),
+    [
+        (np.zeros(12, int), 0.5, np.zeros(12)),
+        (np.repeat([0, -1], 6), 0.5, np.zeros(12)),
+        (np.zeros(12, int), 1.0, np.repeat([100.0, 0.0], 6)),  # known in part: bounded by nothing
+    ],
+)
+def test_errors_of_which_nothing_is_known_are_learned_from_the_data_alone(labels, scale, believed):
     """An effect of a user's own has no entry in the table: its precision is zero."""
-    scales = np.full(12, 0.5)
+    scales = np.full(12, scale)
     with warnings.catch_warnings():
         warnings.simplefilter('error')
-        found, freedom = learned_precision(*equations(), labels, scales, np.zeros(12))
+        found, freedom = learned_precision(*equations(), labels, scales, believed)
     alone, same = learned_precision(*equations(), labels, scales)
     np.testing.assert_array_equal(found, alone)
     assert freedom == same
-
-
-def test_a_group_partly_known_is_bounded_by_nothing():
-    labels, scales = np.zeros(12, int), np.ones(12)
-    believed = np.repeat([100.0, 0.0], 6)
-    found, _ = learned_precision(*equations(), labels, scales, believed)
-    alone, _ = learned_precision(*equations(), labels, scales)
-    np.testing.assert_array_equal(found, alone)
 
 
 @pytest.mark.parametrize(('height', 'low', 'high'), [(0.0, 0.0, 0.25), (2.0, 1.0, 3.0)])

@@ -53,7 +53,14 @@ def main() -> int:
     """Run commands until nobody asks any more."""
     out = os.dup(1)
     os.dup2(2, 1)  # whatever prints must not talk into the answers
-    _load()
+    # What a diagnosis needs, so that a fork has it already.
+    from weld_twin_core import diagnosis  # noqa: F401
+    from weld_twin_msgs_py import bags, robots  # noqa: F401
+
+    from .cli.commands import diagnose  # noqa: F401
+    from .report import diagnosis_files  # noqa: F401
+
+    gc.freeze()  # the forks share these pages
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who asked
     answer(out, {'ready': True})
     rest = b''
@@ -68,17 +75,6 @@ def main() -> int:
         if ended is None:
             return 0
         answer(out, ended)
-
-
-def _load() -> None:
-    """Import what a diagnosis needs, so that a fork has it already."""
-    from weld_twin_core import diagnosis  # noqa: F401
-    from weld_twin_msgs_py import bags, robots  # noqa: F401
-
-    from .cli.commands import diagnose  # noqa: F401
-    from .report import diagnosis_files  # noqa: F401
-
-    gc.freeze()  # the forks share these pages
 
 
 def _in_a_fork(asked: dict[str, Any], out: int) -> dict[str, Any] | None:

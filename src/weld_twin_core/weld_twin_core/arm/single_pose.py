@@ -123,7 +123,10 @@ def _rows(robot: Robot) -> list[_Row]:
             if 'theta' in kinds:
                 parts.append(joint)
             elif 'beta' in kinds:
-                parts += _turn_about_y(beta)
+                # Ry(beta) is Rz(90 deg) Rx(beta) Rz(-90 deg).
+                quarter = 0.5 * np.pi
+                first, last = _link(0.0, beta), _link(0.0, 0.0)
+                parts += [first._replace(theta=quarter), last._replace(theta=-quarter)]
             else:
                 parts.append(_link(a if 'a' in kinds else 0.0, alpha if 'alpha' in kinds else 0.0))
         for part in parts:
@@ -135,13 +138,6 @@ def _rows(robot: Robot) -> list[_Row]:
 
 def _link(a: float, alpha: float) -> _Row:
     return _Row(-1, False, 0.0, 0.0, a, cos(alpha), sin(alpha))
-
-
-def _turn_about_y(beta: float) -> list[_Row]:
-    """Return Ry(beta) as Rz(90 deg) Rx(beta) Rz(-90 deg)."""
-    quarter = 0.5 * np.pi
-    first, last = _link(0.0, beta), _link(0.0, 0.0)
-    return [first._replace(theta=quarter), last._replace(theta=-quarter)]
 
 
 _UNIT = (0.981, 1.019)

@@ -268,22 +268,18 @@ class BasePose(FrameError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        if robot.behind:
-            return self._on_the_workpiece(robot)
+        if robot.behind:  # poses are measured in a frame that a positioner moves
+            now, step = robot.T_world_base, self.vector()
+            new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
+            before, after = (controller_pose(np.array(np.linalg.inv(pose))) for pose in (now, new))
+            return (
+                'Correct the frame on the workpiece: on the positioner it lies at '
+                f'{after} in place of {before}. If it was right '
+                'when it was measured, the fixture has moved, or another one is there.'
+            )
         return (
             f'Correct the base frame by {self.in_words(robot)}. If it was right when it was '
             'measured, the arm has moved: check the bolts of its foot.'
-        )
-
-    def _on_the_workpiece(self, robot: Robot) -> str:
-        """Return the same of a cell, where poses are measured in a frame that a positioner moves."""
-        now, step = robot.T_world_base, self.vector()
-        new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
-        before, after = (controller_pose(np.array(np.linalg.inv(pose))) for pose in (now, new))
-        return (
-            'Correct the frame on the workpiece: on the positioner it lies at '
-            f'{after} in place of {before}. If it was right '
-            'when it was measured, the fixture has moved, or another one is there.'
         )
 
 

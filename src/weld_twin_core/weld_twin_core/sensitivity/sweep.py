@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.robot import Robot
 from ..arrays import Array
-from ..effects import Effect
 from ..effects.backlash import Backlash
 from ..effects.geometry import BasePose, JointOffset, LinkLength
 from .evaluate import exact_deviations
@@ -140,20 +138,16 @@ class Sizes:
     """[rad]"""
 
 
-def _sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
+def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, Array]:
+    """Return the deviations (N, 3) [m] of every source alone and of all ('combined'), in seam axes."""
     size = sizes or Sizes()
-    joints = robot.joint_names
-    return {
+    joints = study.robot.joint_names
+    each = {
         'angular': tuple(JointOffset(joint, size.offset) for joint in joints),
         'link length': tuple(LinkLength(joint, size.length) for joint in joints),
         'initialization': (BasePose(xyz=np.full(3, size.initial / np.sqrt(3.0))),),
         'backlash': tuple(Backlash(joint, size.width) for joint in joints),
     }
-
-
-def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, Array]:
-    """Return the deviations (N, 3) [m] of every source alone and of all ('combined'), in seam axes."""
-    each = _sources(study.robot, sizes)
     out = {name: study.deviations((*study.known, *effects)) for name, effects in each.items()}
     every = tuple(effect for effects in each.values() for effect in effects)
     return {**out, 'combined': study.deviations((*study.known, *every))}

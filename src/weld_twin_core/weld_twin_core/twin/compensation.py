@@ -250,11 +250,20 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
     remaining = []
     for effect in effects:
         if isinstance(effect, ChannelError):
-            robot = _with_row(robot, effect)
+            k = robot.index(str(effect.site))
+            key = effect.channel
+            if key == 'q':
+                key = 'd' if robot.prismatic[k] else 'theta'
+            values = np.array(getattr(robot, key))
+            values[k] += _value(effect)
+            change: dict[str, Any] = {key: values}
+            robot = replace(robot, **change)
         elif isinstance(effect, FrameError):
             robot = _with_frame(robot, effect)
         elif isinstance(effect, Payload) and robot.payload_mass + float(effect.mass) > 0.0:
-            robot = _with_payload(robot, effect)
+            mass = robot.payload_mass + float(effect.mass)
+            moment = robot.payload_mass * robot.payload_com + effect.mass * np.asarray(effect.com)
+            robot = replace(robot, payload_mass=mass, payload_com=moment / mass)
         else:
             remaining.append(effect)
     return robot, tuple(remaining)
@@ -273,17 +282,6 @@ def _value(effect: Effect) -> float:
     return float(getattr(effect, effect.parameters[0].name))
 
 
-def _with_row(robot: Robot, effect: ChannelError) -> Robot:
-    k = robot.index(str(effect.site))
-    key = effect.channel
-    if key == 'q':
-        key = 'd' if robot.prismatic[k] else 'theta'
-    values = np.array(getattr(robot, key))
-    values[k] += _value(effect)
-    change: dict[str, Any] = {key: values}
-    return replace(robot, **change)
-
-
 def _with_frame(robot: Robot, effect: FrameError) -> Robot:
     vector = effect.vector()
     shift = {(effect.channel, k): vector[k] for k in range(6)}
@@ -292,9 +290,3 @@ def _with_frame(robot: Robot, effect: FrameError) -> Robot:
     if effect.channel == 'root':
         return replace(robot, T_root_base=transform(*root_frame(robot, shift)))
     return robot.with_frames(tool=transform(*tool_frame(robot, shift)))
-
-
-def _with_payload(robot: Robot, effect: Payload) -> Robot:
-    mass = robot.payload_mass + float(effect.mass)
-    moment = robot.payload_mass * robot.payload_com + effect.mass * np.asarray(effect.com)
-    return replace(robot, payload_mass=mass, payload_com=moment / mass)

@@ -213,7 +213,9 @@ class _Work:
             added = self._added(result, self.goal.t)
             self.largest = self.largest or _largest(added)
             try:
-                self._refuse_large(added)
+                length, turn = _largest(added)
+                if length > self.limits.length or turn > self.limits.turn:
+                    raise _RefusedError(too_large(length, turn, self.limits[:2]))
                 self._refuse_beyond(course(result, self.meant.t), 'the corrected goal')
                 self._refuse_quick(result)
             except _RefusedError as refused:
@@ -382,11 +384,6 @@ class _Work:
                 f'the model is less sure of this goal ({doubt * 1e3:.3f} mm) than the correction is '
                 f'large ({rms_of(size) * 1e3:.3f} mm)'
             )
-
-    def _refuse_large(self, added: Array) -> None:
-        length, turn = _largest(added)
-        if length > self.limits.length or turn > self.limits.turn:
-            raise _RefusedError(too_large(length, turn, self.limits[:2]))
 
     def _refuse_quick(self, result: Goal) -> None:
         if self.meant.t.size < 2:

@@ -118,7 +118,9 @@ class PoseCorrection:
         q, size = near, np.inf
         for _ in range(_ROUNDS):
             beside = q + self._sides
-            real = self._real_poses(beside)
+            real = np.asarray(
+                self._back @ self._twin.poses(self._still.recording(_standing(beside))).matrices
+            )
             error, rise = between(real[0], pose), _rise(real)
             size = np.abs(error).max()
             step = least_step(rise, error, _SINGULAR)
@@ -159,7 +161,7 @@ class PoseCorrection:
         """Return what is added to a pose (6,) [m, rad], and how far the look is, over its reach."""
         assert self._at is not None
         way, size = _away(self._at, pose)
-        onward = _onward(self._way, way)
+        onward = bool(self._way @ way > _ONWARD * sqrt((self._way @ self._way) * (way @ way)))
         reach = self._reach if onward else min(self._reach, _REACH[1])
         return _extrapolated(self._at, self._bend, way, size)[:6], size / reach
 
@@ -196,11 +198,6 @@ class PoseCorrection:
         """Return where the controller has the tool, ``T_base_tool`` (4, 4), of a posture (n,)."""
         return self._single(q)
 
-    def _real_poses(self, q: Array) -> Array:
-        return np.asarray(
-            self._back @ self._twin.poses(self._still.recording(_standing(q))).matrices
-        )
-
 
 def _rise(poses: Array) -> Array:
     """Return d pose / d joint, shape (6, n), of a pose and those with joints to either side of it."""
@@ -226,11 +223,6 @@ def _size(way: Array) -> float:
 def _extrapolated(at: Looked, bend: Array, way: Array, size: float) -> Array:
     """Return a look's value a way (6,) from it, (6 + n,), its slope bent onwards with its size."""
     return np.asarray(at.values + (at.slope + 0.5 * size * bend) @ way)
-
-
-def _onward(before: Array, way: Array) -> bool:
-    """Return whether a way goes on in the direction of the one before."""
-    return bool(before @ way > _ONWARD * sqrt((before @ before) * (way @ way)))
 
 
 def between(start: Array, end: Array) -> Array:

@@ -13,7 +13,7 @@ import errno
 import json
 import shutil
 import sqlite3
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -162,12 +162,7 @@ def _information(folder: Path) -> dict[str, Any]:
 
 
 def _parsed(data: bytes) -> Any:
-    _refuse_deep(data)
-    return yaml.load(data, Loader=_Loader)
-
-
-def _refuse_deep(data: bytes) -> None:
-    """Refuse nesting on which the fast loader would overflow the stack and end the process."""
+    """Return YAML, refused where its nesting would overflow the stack of the fast loader."""
     depth = 0
     for event in yaml.parse(data, Loader=_Loader):
         if isinstance(event, yaml.CollectionStartEvent):
@@ -176,6 +171,7 @@ def _refuse_deep(data: bytes) -> None:
             depth -= 1
         if depth > DEPTH_LIMIT:
             raise ValueError('metadata.yaml is nested too deeply')
+    return yaml.load(data, Loader=_Loader)
 
 
 zstd: Any = storage_mcap.zstd  # type: ignore[attr-defined]
@@ -302,7 +298,12 @@ class BagReader:
                 for file in bag.files:
                     self._open(file)
                 self._list_topics()
-                self.provenance = _provenance(bag.custom)
+                start = len(PROVENANCE_PREFIX)
+                self.provenance = {
+                    key[start:]: json.loads(value)
+                    for key, value in bag.custom.items()
+                    if str(key).startswith(PROVENANCE_PREFIX)
+                }
         except BaseException:
             self._stack.close()
             raise
@@ -417,15 +418,6 @@ def _as_written(storage: Any) -> Iterator[tuple[int, IntArray]]:
         read = storage.dbconn.execute('SELECT topic_id, timestamp FROM messages ORDER BY id')
         rows = np.array(list(read), np.int64).reshape(-1, 2)
         yield from ((int(k), rows[rows[:, 0] == k, 1]) for k in np.unique(rows[:, 0]))
-
-
-def _provenance(custom: Mapping[Any, Any]) -> dict[str, Any]:
-    start = len(PROVENANCE_PREFIX)
-    return {
-        key[start:]: json.loads(value)
-        for key, value in custom.items()
-        if str(key).startswith(PROVENANCE_PREFIX)
-    }
 
 
 def has_header(kind: str) -> bool:

@@ -122,7 +122,11 @@ def _effect(kind: type[Effect]) -> Schema:
         if parameter is None:
             keys[item.name] = _of_type(str(getattr(item.type, '__name__', item.type)))
         else:
-            one = _bounded(parameter.lower, parameter.upper)
+            one = dict(NUMBER)
+            if parameter.lower > -float('inf'):
+                one['minimum'] = parameter.lower
+            if parameter.upper < float('inf'):
+                one['maximum'] = parameter.upper
             many = {'type': 'array', 'items': one}
             size = {'minItems': parameter.size, 'maxItems': parameter.size}
             keys[item.name] = {
@@ -136,15 +140,6 @@ def _effect(kind: type[Effect]) -> Schema:
         'title': kind.name,
         'description': kind.traits.formula,
     }
-
-
-def _bounded(lower: float, upper: float) -> Schema:
-    out = dict(NUMBER)
-    if lower > -float('inf'):
-        out['minimum'] = lower
-    if upper < float('inf'):
-        out['maximum'] = upper
-    return out
 
 
 def _of_type(annotation: str) -> Schema:

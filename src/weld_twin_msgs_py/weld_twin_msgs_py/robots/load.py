@@ -49,8 +49,10 @@ def robot_names() -> tuple[str, ...]:
     return (*catalog.names(), *(name for name in own if name.lower() not in catalog.names()))
 
 
-def _own_robot(spec: str) -> Path | None:
-    """Return the file of a robot of one's own, in any letters; None for other names."""
+def as_file(spec: str) -> str:
+    """Return the path of a robot's file where a name is that of one's own; else what was given."""
+    if Path(spec).is_file():
+        return spec
     result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
     if result and spec.lower() in catalog.names():
         result.insert(0, 'the bundled one')
@@ -58,15 +60,7 @@ def _own_robot(spec: str) -> Path | None:
         raise ModelError(
             f'{spec!r} is the name of several robots: {", ".join(result)}; rename all files but one'
         )
-    return Path(result[0]) if result else None
-
-
-def as_file(spec: str) -> str:
-    """Return the path of a robot's file where a name is that of one's own; else what was given."""
-    if Path(spec).is_file():
-        return spec
-    own = _own_robot(spec)
-    return spec if own is None else str(own)
+    return result[0] if result else spec
 
 
 def _looked_in() -> str:

@@ -100,7 +100,12 @@ def parse_urdf(
         flange = flange_link_of(tree, chain.down, tip, flange_link)
         robot = replace(robot, controller=_controller(robot, origin, flange))
         if chain.up:
-            robot = _beside(tree, chain, robot, source)
+            gravity = _gravity(tree, chain.up[0].parent)
+            cell = robot.behind_workpiece(_robot(tree, chain.up, gravity, np.eye(4), source))
+            assert robot.controller is not None
+            # What people call the base is the link that was asked for: the table.
+            table = replace(robot.controller, foot=inverse(cell.T_world_base))
+            robot = replace(cell, controller=table)
         refuse_wrong_units(robot)
     except ModelError as error:
         raise ModelError(f"URDF '{source}': {error}") from None
@@ -122,16 +127,6 @@ def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | Non
     tree = read_tree(path)
     base = _base(tree, base_link)
     return _chain(tree, base, _tip(tree, base, tip_link))
-
-
-def _beside(tree: Tree, chain: Chain, robot: Robot, path: Path | str) -> Robot:
-    """Return the chain from the base link on a positioner to the tool of a robot."""
-    gravity = _gravity(tree, chain.up[0].parent)
-    cell = robot.behind_workpiece(_robot(tree, chain.up, gravity, np.eye(4), path))
-    assert robot.controller is not None
-    # What people call the base is the link that was asked for: the table.
-    table = replace(robot.controller, foot=inverse(cell.T_world_base))
-    return replace(cell, controller=table)
 
 
 def _controller(

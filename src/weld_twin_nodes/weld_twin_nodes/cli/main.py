@@ -76,7 +76,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         args = parser_of(words).parse_args(renamed(words))
         code = int(args.run(args))
-        _say_new_name(words)
+        typed = _command(words)
+        if typed in OLD:
+            print(
+                f"weld-twin: '{typed}' is 'weld-twin {OLD[typed]}' now; the old name goes with the next "
+                'release',
+                file=sys.stderr,
+            )
         return code
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -117,17 +123,6 @@ def renamed(words: Sequence[str]) -> list[str]:
         if command.usual and out[at + 1] not in (*HELP, *command.jobs):
             out.insert(at + 1, command.usual)
     return out
-
-
-def _say_new_name(words: Sequence[str]) -> None:
-    """Say on stderr what an old spelling is called now."""
-    typed = _command(words)
-    if typed in OLD:
-        print(
-            f"weld-twin: '{typed}' is 'weld-twin {OLD[typed]}' now; the old name goes with the next "
-            'release',
-            file=sys.stderr,
-        )
 
 
 def parser_of(words: Sequence[str] = ()) -> Parser:

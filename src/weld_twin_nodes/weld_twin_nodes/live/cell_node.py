@@ -395,7 +395,11 @@ class CellNode(TellingNode):
     def destroy_node(self) -> None:
         """Tell what was sent in all, and stay until everybody has it."""
         if self.context.ok():
-            self._meet_listeners()
+            # Who listens to the health of nodes may not have found a new one yet.
+            end = time.monotonic() + MEETS
+            there = self.diagnostics.get_subscription_count
+            while there() < self.count_subscribers(DIAGNOSTICS.name) and time.monotonic() < end:
+                time.sleep(READY_EVERY)
             self.tell_health()
             self.tell_last_losses()
             begun = time.monotonic()
@@ -406,13 +410,6 @@ class CellNode(TellingNode):
                         'this node ends without waiting for it any longer'
                     )
         super().destroy_node()  # type: ignore[no-untyped-call]
-
-    def _meet_listeners(self) -> None:
-        """Wait until those who listen to the health of nodes have found this one: it may be new."""
-        end = time.monotonic() + MEETS
-        there = self.diagnostics.get_subscription_count
-        while there() < self.count_subscribers(DIAGNOSTICS.name) and time.monotonic() < end:
-            time.sleep(READY_EVERY)
 
     def _taken_in(self, output: Output, begun: float) -> bool:
         """Wait until all who take an output have all of it, or stand still; return whether they have."""

@@ -343,18 +343,15 @@ class Compensator(ManagedNode):
         self._frame.take(message.header.frame_id)
         stream = self._stream
         if stream is None:
-            self._on_pose_inactive(message)
+            self.refuse(self.resolve_topic_name(topics.POSE_IN.relative), INACTIVE)
+            if self.setting('on_refusal') == 'pass' and self.setting('apply'):
+                encode, _ = self._encoder(message.header.frame_id)
+                self._out.publish(
+                    encode(from_messages.stamp_ns(message), *from_messages.pose(message))
+                )
         else:
             self._on_pose_for(stream, message)
         self.remark(self._frame.remark)
-
-    def _on_pose_inactive(self, message: Any) -> None:
-        self.refuse(self.resolve_topic_name(topics.POSE_IN.relative), INACTIVE)
-        if self.setting('on_refusal') == 'pass' and self.setting('apply'):
-            encode, _ = self._encoder(message.header.frame_id)
-            self._out.publish(
-                encode(from_messages.stamp_ns(message), *from_messages.pose(message))
-            )
 
     def _on_pose_for(self, stream: PoseStream, message: Any) -> None:
         """Send what becomes of a pose; all that may be late comes after that."""

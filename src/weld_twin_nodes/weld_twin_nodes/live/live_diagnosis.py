@@ -186,7 +186,12 @@ class LiveDiagnosis(ManagedNode):
         super().__init__('live_diagnosis', **kwargs)
         self._twin = place_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
-        self._names = self._looked_with()
+        texts = (
+            [part for part in self.setting(name).split(',') if part]
+            for name in ('cameras', 'targets')
+        )
+        cameras, targets = given_cameras(*texts)
+        self._names = topics.TopicNames(cameras=cameras, targets=targets)
         self._window = self._empty_window()
         self._worker = Worker(self.get_logger().warning)
         self._begun = -float('inf')
@@ -197,14 +202,6 @@ class LiveDiagnosis(ManagedNode):
         self._measured: MeasuredInputs | None = None
         self._looking: Any = None
         self.start()
-
-    def _looked_with(self) -> topics.TopicNames:
-        texts = (
-            [part for part in self.setting(name).split(',') if part]
-            for name in ('cameras', 'targets')
-        )
-        cameras, targets = given_cameras(*texts)
-        return topics.TopicNames(cameras=cameras, targets=targets)
 
     def prepare(self) -> None:
         """Nothing is left to look at: robot and model were read when the node started."""

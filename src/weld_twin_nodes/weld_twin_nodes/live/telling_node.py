@@ -150,7 +150,11 @@ class TellingNode(Node):
 
     def tell_health(self) -> None:
         self.look()
-        self._look_at_losses()
+        now = time.monotonic()
+        for name, losses in self._losses.items():  # of inputs that lack messages
+            for sentence in losses.look(now):
+                self.tell_once(sentence)
+            self.keep(_loss_of(name), losses.telling, logged=False)
         self._look_at_old_values()
         self._look_at_partners()
         self.diagnostics.publish(
@@ -167,14 +171,6 @@ class TellingNode(Node):
         """Hold what a node tells it has sent against what has come of it."""
         for topic in word.sent.keys() & self._losses.keys():
             self._losses[topic].tell(word)
-
-    def _look_at_losses(self) -> None:
-        """Tell of an input that lacks messages when it begins and when it ends."""
-        now = time.monotonic()
-        for name, losses in self._losses.items():
-            for sentence in losses.look(now):
-                self.tell_once(sentence)
-            self.keep(_loss_of(name), losses.telling, logged=False)
 
     def _look_at_old_values(self) -> None:
         """Tell, as long as it is so, of a value that counts although nobody tells it any more."""

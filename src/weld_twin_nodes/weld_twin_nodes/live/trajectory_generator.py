@@ -170,11 +170,7 @@ class Pump:
             end = min(end, int(np.searchsorted(self._stamps, reached, side='right')))
         out = range(self.sent, max(end, self.sent))
         self.sent = out.stop
-        self._widen(now)
-        return out
-
-    def _widen(self, now: int) -> None:
-        """Open the window when answers stay out: a late measurement clock shifts them all."""
+        # The window opens when answers stay out: a late measurement clock shifts them all.
         if self.sent < self._limit or self.done:
             self._progress = None
         elif self._progress is None:
@@ -183,6 +179,7 @@ class Pump:
             self._window *= 2
             self._limit += self._window
             self._progress = None
+        return out
 
 
 TICK = 0.002
@@ -256,14 +253,6 @@ class TrajectoryGenerator(CellNode):
         self._meeting: Meeting | None = None
         self._given = False
         self._follow()
-        self._take_source()
-
-    @property
-    def done(self) -> bool:
-        """Return whether the last sample was sent."""
-        return self._pump is not None and self._pump.done and self._rounds == 0
-
-    def _take_source(self) -> None:
         source = self.setting('source')
         if source == 'plan':
             self._run(joint_motion(self._robot, self.setting('path'), *self._law))
@@ -271,6 +260,11 @@ class TrajectoryGenerator(CellNode):
             self.listen(topics.JOINT_TRAJECTORY, self._on_trajectory, required=True)
         else:
             self.listen(topics.PATH, self._on_path, required=True)
+
+    @property
+    def done(self) -> bool:
+        """Return whether the last sample was sent."""
+        return self._pump is not None and self._pump.done and self._rounds == 0
 
     def _on_trajectory(self, message: Any) -> None:
         self._refuse_busy()
@@ -349,19 +343,16 @@ class TrajectoryGenerator(CellNode):
                 self._encode(int(self._stamps[k]), self._motion.q[k], self._motion.velocity[k])
             )
         if self._pump.done and self._rounds:
-            self._turn()
+            # It goes back the way it came, the first sample one step after the last one.
+            self._rounds -= 1
+            self._motion = backward(self._motion)
+            self._stamp(2 * int(self._stamps[-1]) - int(self._stamps[-2]))
         if self._pump.done or (self._playback == 0.0 and not self.setting('follow')):
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
         if self._pump.done:
             self._timer.cancel()
             self.get_logger().info(f'{self._pump.sent} joint states sent')
             self.finished = self.setting('exit_when_done')
-
-    def _turn(self) -> None:
-        """Go back the way the motion came, its first sample one step after the last one."""
-        self._rounds -= 1
-        self._motion = backward(self._motion)
-        self._stamp(2 * int(self._stamps[-1]) - int(self._stamps[-2]))
 
 
 def _listened(listeners: dict[str, int]) -> str:

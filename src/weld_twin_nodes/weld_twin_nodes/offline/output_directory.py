@@ -152,7 +152,11 @@ def carry_out(folder: Path, scratch: Path) -> None:
             continue
         foreign = _foreign(folder, name, ours)
         if foreign is None:
-            _drop(folder, name)
+            (folder / name).unlink()
+            with suppress(OSError):
+                for above in Path(name).parents:
+                    if above != Path('.'):
+                        (folder / above).rmdir()
         else:
             _keep(folder, foreign)
     if _is_no_list(folder):
@@ -239,15 +243,6 @@ def _kept_name(folder: Path, name: str) -> str:
     return next(new for new in names if not _there(folder / new)).as_posix()
 
 
-def _drop(folder: Path, name: str) -> None:
-    """Remove a file of ours, and folders that are empty then."""
-    (folder / name).unlink()
-    with suppress(OSError):
-        for above in Path(name).parents:
-            if above != Path('.'):
-                (folder / above).rmdir()
-
-
 def refuse(folder: Path, mark: str, names: list[str]) -> None:
     """Refuse a change that files are in the way of."""
     if names:
@@ -282,7 +277,10 @@ def new_directory(
         sweep(target, INSIDE, rescue)
         _refuse_foreign(target, mark, force or shared)
         if not (force or shared):
-            _refuse_before(target, mark)
+            # What would be refused when all is computed is refused now, as far as it is known.
+            own = listed(target).get(mark, {})
+            unlisted = [mark] if mark not in own and os.path.lexists(target / mark) else []
+            refuse(target, mark, changed(target, own) + unlisted)
         place = (target, INSIDE) if target.is_dir() else (target.parent, f'.{_name(target)}-')
         scratch = Scratch(*place, rescue)
     except OSError as error:
@@ -362,13 +360,6 @@ def _install(target: Path, scratch: Scratch, mark: str, force: bool, adds: bool)
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise
-
-
-def _refuse_before(target: Path, mark: str) -> None:
-    """Refuse what would be refused when all is computed, as far as it is known."""
-    own = listed(target).get(mark, {})
-    unlisted = [mark] if mark not in own and os.path.lexists(target / mark) else []
-    refuse(target, mark, changed(target, own) + unlisted)
 
 
 def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:

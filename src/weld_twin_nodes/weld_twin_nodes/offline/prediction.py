@@ -14,7 +14,6 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.motion.inverse.along_path import ILL_CONDITIONED, PathSolution
@@ -266,16 +265,12 @@ def compensated(
     least = 1.0 if share is None else float(share.min())
     motion = result.motion
     if stored is not None and recording is not given:
-        motion = _as_given(motion, stored)
+        # They go to the same controller, so they are counted as they came.
+        matrix, offset = stored.reading_map()
+        back = np.linalg.inv(matrix).T
+        qd = None if motion.qd is None else motion.qd @ back
+        motion = replace(motion, q=(motion.q - offset) @ back, qd=qd)
     return Compensated(result, model, model.outside(recording), least, motion, notes)
-
-
-def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
-    """Return mended joint positions counted as they came: they go to the same controller."""
-    matrix, offset = stored.reading_map()
-    back = np.linalg.inv(matrix).T
-    qd = None if motion.qd is None else motion.qd @ back
-    return replace(motion, q=(motion.q - offset) @ back, qd=qd)
 
 
 def write_compensated(

@@ -60,21 +60,17 @@ def region(
     elif Path(given).is_file():
         language = language or language_of(read_source(given), given, '')
         context = context or Context(robot, controller_of(robot, language))
-        q = _of_program(robot, given, context, language)
+        program = read_program(given, context, language)
+        way = travel(robot, to_moves(program, context.robot, context.controller), None, None)
+        parts = [piece.motion.q for piece in way.pieces]
+        if not parts:
+            raise DataError(f"no move of the region '{given}' can be followed")
+        q = np.concatenate(parts)
     else:
         q = _in_box(robot, _box(given))
     chosen = q[np.unique(np.linspace(0, len(q) - 1, min(POSTURES, len(q))).round().astype(int))]
     judged = np.unique(np.linspace(0, len(chosen) - 1, min(JUDGED, len(chosen))).round())
     return chosen[judged.astype(int)], chosen
-
-
-def _of_program(robot: Robot, path: str, context: Context, language: str) -> Array:
-    program = read_program(path, context, language)
-    way = travel(robot, to_moves(program, context.robot, context.controller), None, None)
-    parts = [piece.motion.q for piece in way.pieces]
-    if not parts:
-        raise DataError(f"no move of the region '{path}' can be followed")
-    return np.concatenate(parts)
 
 
 def _box(given: str) -> Array:

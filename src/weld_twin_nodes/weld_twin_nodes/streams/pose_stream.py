@@ -130,7 +130,10 @@ class PoseStream:
         if not 0.0 <= now - self._last <= SILENT:
             self.forget()
         self._since, self._last = now - self._last, now
-        rest = self._rested(pose, now)
+        at = self._rest_pose
+        if at is None or np.abs(pose - at).max() > STILL:
+            self._rest_pose, self._rest_since = pose, now
+        rest = now - self._rest_since
         if self._fresh is not None and (rest >= REST or self._mode != 'corrected'):
             self._exchange(self._fresh)
         added, why = self._wanted(pose, now, rest, arm, withdrawn)
@@ -374,13 +377,6 @@ class PoseStream:
         if now - ramp.begun >= ramp.span:
             self._mode, self._ramp = ramp.mode, None
         return Given(moved(ramp.pose, added), added, why)
-
-    def _rested(self, pose: Array, now: float) -> float:
-        """Return for how long the stream has stood still [s]."""
-        at = self._rest_pose
-        if at is None or np.abs(pose - at).max() > STILL:
-            self._rest_pose, self._rest_since = pose, now
-        return now - self._rest_since
 
 
 def _over(values: Array, limits: Array, name: str, robot: Robot) -> str:

@@ -168,17 +168,12 @@ def _worst(diagnosis: Diagnosis) -> Figure | None:
     words = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
     if len(diagnosis.recordings) > 1:
         words = f'{diagnosis.recordings[k].name}, {words}'
-    words += _place(diagnosis, k, sample)
+    x, y, z = (f'{1e3 * float(v):.0f}' for v in diagnosis.traces.measured[k][sample])
+    words += f", at x {x}, y {y}, z {z} mm in the instrument's frame"
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is not None and sides_words(parts[sample]):
         words += f': {sides_words(parts[sample])}'
     return 'At the worst spot', millimetres(largest(diagnosis)), words
-
-
-def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
-    """Return where in space a sample was measured."""
-    x, y, z = (f'{1e3 * float(v):.0f}' for v in diagnosis.traces.measured[k][sample])
-    return f", at x {x}, y {y}, z {z} mm in the instrument's frame"
 
 
 def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
@@ -258,21 +253,16 @@ def _data(answer: Answer) -> Figure | None:
     out, every = left_out(diagnosis)
     if out:
         notes.append(f'{out} of {counted(every, "sample")} left out')
-    notes += _instrument(answer)
-    word = 'yes, see the notes' if notes else 'yes'
-    word = 'see the warnings' if counts['warning'] else word
-    words = f'{passed(fine, len(checks))}{"; " if notes else ""}{"; ".join(notes)}. '
-    return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
-
-
-def _instrument(answer: Answer) -> list[str]:
-    """Return which cause sits with what measured, and how much of the gap that makes."""
-    return [
+    notes += [
         f'but cause {k}, {answer.percent(item.cause.share)} of the gap, sits at '
         f'{likely(item.cause.place)}'
         for k, item in enumerate(answer.causes[:_CAUSES], 1)
         if {at for at, _ in leading(item.cause.place)} & {'instrument', 'clock'}
     ]
+    word = 'yes, see the notes' if notes else 'yes'
+    word = 'see the warnings' if counts['warning'] else word
+    words = f'{passed(fine, len(checks))}{"; " if notes else ""}{"; ".join(notes)}. '
+    return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
 
 
 def causes_table(answer: Answer) -> Html | None:

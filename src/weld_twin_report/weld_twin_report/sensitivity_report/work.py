@@ -39,15 +39,6 @@ _models: dict[str, Model] = {}
 """What a worker made last, by content: it sees the same study many times."""
 
 
-def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
-    key = digest(study, tolerances)
-    if key not in _models:
-        while len(_models) >= _KEPT:
-            del _models[next(iter(_models))]
-        _models[key] = sensitivity.model(study, tolerances)
-    return _models[key]
-
-
 @dataclass(frozen=True)
 class StackDesign:
     """Which runs a tolerance stack needs: independent ones, as many as were asked for."""
@@ -90,7 +81,12 @@ def run_packed(
 
     The model of wider tolerances holds for narrower ones that the runs are ``drawn`` from.
     """
-    model = _model(study, tolerances)
+    key = digest(study, tolerances)
+    if key not in _models:
+        while len(_models) >= _KEPT:
+            del _models[next(iter(_models))]
+        _models[key] = sensitivity.model(study, tolerances)
+    model = _models[key]
     block = _samples(design)[start : start + BLOCK]
     result = model(sensitivity.draws_at(drawn or tolerances, block))
     return {'model_error': model.error, 'outcomes': packed(result)}

@@ -288,7 +288,14 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
 
     Any of the user's jobs that has a diagnosis may correct it; ``of`` is the one chosen first.
     """
-    models = _models(jobs)
+    done = [job for job in jobs if job.state == DONE and job.kind != PROGRAM]
+    models = [
+        ('', 'none of these: I drop a diagnosis below'),
+        *(
+            (job.key, f'{", ".join(job.names[:2])}, {job.asked.robot}, {_when(job)}')
+            for job in done
+        ),
+    ]
     robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in robot_names())]
     hint = 'as the controller has it (.src with its .dat, .mod, .ls, .jbi, .script, ...)'
     with_it = 'diagnosis.json, and the file of the robot if it is none of the list'
@@ -310,18 +317,6 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
     lead = 'Its points are moved so that the real tool goes where the program means it.'
     body = section('Correct a program', form, id_='drop', lead=lead)
     return page('correct a program', _said(said, CORRECT), body, site=site)
-
-
-def _models(jobs: Sequence[Job]) -> list[tuple[str, str]]:
-    """Return what a program may be corrected by."""
-    done = [job for job in jobs if job.state == DONE and job.kind != PROGRAM]
-    return [
-        ('', 'none of these: I drop a diagnosis below'),
-        *(
-            (job.key, f'{", ".join(job.names[:2])}, {job.asked.robot}, {_when(job)}')
-            for job in done
-        ),
-    ]
 
 
 def _when(job: Job) -> str:

@@ -76,7 +76,11 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
     settings = replace(settings, port=port)
     queue = Queue(settings)
     try:
-        _scratch(settings)
+        # What is written in passing, by its commands too, lies in the server's own folder.
+        place = (settings.directory / SCRATCH).absolute()
+        shutil.rmtree(place, ignore_errors=True)  # of a server that was killed
+        place.mkdir()
+        os.environ['TMPDIR'] = tempfile.tempdir = str(place)
         doors = Doors()
         app = make_app(settings, queue, doors, _live(settings))
         config = uvicorn.Config(
@@ -96,14 +100,6 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
     finally:
         queue.stop()
         listening.close()
-
-
-def _scratch(settings: Settings) -> None:
-    """Have what is written in passing lie in the server's own folder, for its commands too."""
-    place = (settings.directory / SCRATCH).absolute()
-    shutil.rmtree(place, ignore_errors=True)  # of a server that was killed
-    place.mkdir()
-    os.environ['TMPDIR'] = tempfile.tempdir = str(place)
 
 
 def _listening(settings: Settings) -> socket.socket:

@@ -125,7 +125,11 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     kind = family(robot)
     of_all = _followed if kind is None else _closed
     tracks = of_all(robot, poses, seed)
-    failures = _first_failures(robot, tracks, poses)
+    fails: _Mask = np.any(
+        np.isnan(tracks) | (tracks < robot.lower) | (tracks > robot.upper), axis=-1
+    )
+    fails[:, 1:] |= jumps(robot, tracks, poses)
+    failures = np.where(fails.any(axis=1), fails.argmax(axis=1), len(poses))
     good = np.flatnonzero(failures == len(poses))
     if not good.size:
         raise ReachError(_explain(robot, tracks, failures, poses))
@@ -219,13 +223,6 @@ def _track(robot: Robot, q: Array, poses: Array) -> Array:
         lost = ~(np.abs(error).max(axis=-1) < CLOSED)
         out.append(np.where(lost[:, None], np.nan, q))
     return np.stack(out, axis=1)
-
-
-def _first_failures(robot: Robot, q: Array, poses: Array) -> NDArray[np.intp]:
-    """Return of tracks (K, N, n) the first sample not reached, past a limit or after a jump, or N."""
-    fails: _Mask = np.any(np.isnan(q) | (q < robot.lower) | (q > robot.upper), axis=-1)
-    fails[:, 1:] |= jumps(robot, q, poses)
-    return np.where(fails.any(axis=1), fails.argmax(axis=1), len(poses))
 
 
 def _best_first(robot: Robot, q: Array, seed: Array | None) -> NDArray[np.intp]:

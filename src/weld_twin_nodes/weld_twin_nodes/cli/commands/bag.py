@@ -22,7 +22,15 @@ if TYPE_CHECKING:
 def info(given: Given) -> int:
     """Print what is in a bag, or which robots there are."""
     if given.robots:
-        return _print_robots()
+        from weld_twin_core.arm import catalog
+        from weld_twin_msgs_py.robots import own_files
+
+        for name in catalog.names():
+            robot = catalog.load(name)
+            print(f'{name:16} {robot.n} joints  {robot.source}')
+        for file in own_files():
+            print(f'{file.stem:16} your own  {file}')
+        return 0
     if not given.bag:
         raise DataError('give a BAG, or --robots')
     from weld_twin_msgs_py.bags import bag_info
@@ -85,18 +93,6 @@ def _effect(entry: Mapping[str, Any]) -> str:
         if name not in ('effect', 'joint')
     ]
     return f'{cause(entry["effect"], entry.get("joint"))} ({", ".join(values)})'
-
-
-def _print_robots() -> int:
-    from weld_twin_core.arm import catalog
-    from weld_twin_msgs_py.robots import own_files
-
-    for name in catalog.names():
-        robot = catalog.load(name)
-        print(f'{name:16} {robot.n} joints  {robot.source}')
-    for file in own_files():
-        print(f'{file.stem:16} your own  {file}')
-    return 0
 
 
 def recover(given: Given) -> int:

@@ -47,7 +47,11 @@ def run(given: Given) -> int:
     if not given.force:
         _refuse_another(Path(given.out), what)
     if given.model:
-        _refuse_corrected(what)
+        content = _correction_in(what.resolve().parent)
+        moves = content.get('moves', ())
+        some = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
+        if some and content.get('program') == what.name:
+            raise corrected_twice(what.name, f"'{RESULT}' beside it says so")
     return _corrected_program(given)
 
 
@@ -56,15 +60,6 @@ def _correction_in(folder: Path) -> dict[str, Any]:
         return read_json(folder / RESULT)
     except DataError:
         return {}
-
-
-def _refuse_corrected(program: Path) -> None:
-    """Refuse a program that lies where a correction without remarks moved its points."""
-    content = _correction_in(program.resolve().parent)
-    moves = content.get('moves', ())
-    some = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
-    if some and content.get('program') == program.name:
-        raise corrected_twice(program.name, f"'{RESULT}' beside it says so")
 
 
 def _refuse_another(out: Path, program: Path) -> None:

@@ -35,7 +35,7 @@ from weld_twin_nodes.cli.given import (
     twin_of,
 )
 from weld_twin_nodes.offline.exporting import without_limits
-from weld_twin_nodes.offline.set_up_changes import SetUpChange, set_up_change, with_changes
+from weld_twin_nodes.offline.set_up_changes import set_up_change, with_changes
 
 from ...report import print_summary
 from ...report.diagnosis_files import PDF, RESULT, browser, print_page, write_results
@@ -54,19 +54,6 @@ JOINT_STATES = 150_000
 """The same; twenty minutes at 125 Hz."""
 
 
-def _sheet(given: Given) -> Sheet:
-    """Return what the page is to show; checked before anything is computed."""
-    if given.pdf:
-        browser()
-    labels = (
-        joint_labels(given.joint_names, given.load_robot().joint_names)
-        if given.joint_names
-        else {}
-    )
-    sizes = [_metres(getattr(given, name), f'--{name}') for name in ('tolerance', 'uncertainty')]
-    return Sheet(Demand(*sizes), labels, given.controller)
-
-
 def _metres(value: float | None, option: str) -> float | None:
     if value is not None and not 0.0 < value < 1000.0:
         raise ModelError(f'{option} {value:g}: give millimetres above 0 and below 1000')
@@ -75,7 +62,15 @@ def _metres(value: float | None, option: str) -> float | None:
 
 def run(given: Given) -> int:
     """Diagnose, write the results, print the verdict."""
-    sheet = _sheet(given)
+    if given.pdf:
+        browser()
+    labels = (
+        joint_labels(given.joint_names, given.load_robot().joint_names)
+        if given.joint_names
+        else {}
+    )
+    sizes = [_metres(getattr(given, name), f'--{name}') for name in ('tolerance', 'uncertainty')]
+    sheet = Sheet(Demand(*sizes), labels, given.controller)
     with given.output(RESULT) as place:
         inputs = inputs_of(
             recording=given.bag,
@@ -105,7 +100,11 @@ def _diagnosis(given: Given, inputs: Sequence[InputFile]) -> Diagnosis:
     changing = families_named(given.may_change, '--may-change')
     if changing and len(given.bag) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
-    changes = _changes(given)
+    changes = {}  # by the place of the bag
+    for bag, what in given.changed:
+        if bag not in given.bag:
+            raise DataError(f"--changed: '{bag}' is none of the recordings")
+        changes[given.bag.index(bag)] = set_up_change(what)
     twin = twin_of(given.load_robot(), given.effects_known)
     judged = region(twin.robot, given.region)[0] if given.region else None
     with _progress() as tell:
@@ -156,16 +155,6 @@ def _in_region(result: Diagnosis, region: str, judged: Array) -> Diagnosis:
         return result
     sigma = corrected_sigma(result.posterior, result.model, judged)
     return replace(result, posterior=replace(result.posterior, region=(region, sigma)))
-
-
-def _changes(given: Given) -> dict[int, SetUpChange]:
-    """Return what was changed for which bag, counted from 0."""
-    out = {}
-    for bag, what in given.changed:
-        if bag not in given.bag:
-            raise DataError(f"--changed: '{bag}' is none of the recordings")
-        out[given.bag.index(bag)] = set_up_change(what)
-    return out
 
 
 def _limits(given: Given) -> Limits:

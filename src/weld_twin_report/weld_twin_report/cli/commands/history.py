@@ -132,7 +132,14 @@ def _verified_row(result: Verified) -> list[str]:
 
 def changed(given: Given) -> int:
     """Say what changed, since when, and where it leads."""
-    allowed = _allowed(given.limit)
+    allowed = {}
+    for text in given.limit:
+        effect, value = pair(text, '--limit', 'EFFECT=VALUE, such as backlash=0.0017')
+        try:
+            allowed[effect] = float(value)
+        except ValueError:
+            raise DataError(f"--limit: '{value}' is no number") from None
+        refuse_unknown_effect('--limit', effect)
     with opened(given) as database:
         entries = database.entries(given.cell)
     seen = observations(entries)
@@ -152,18 +159,6 @@ def changed(given: Given) -> int:
         if ahead is not None:
             print(f'{given.cell}: {words.forecast_sentence(change, ahead)}')
     return 0
-
-
-def _allowed(texts: Sequence[str]) -> dict[str, float]:
-    out = {}
-    for text in texts:
-        effect, value = pair(text, '--limit', 'EFFECT=VALUE, such as backlash=0.0017')
-        try:
-            out[effect] = float(value)
-        except ValueError:
-            raise DataError(f"--limit: '{value}' is no number") from None
-        refuse_unknown_effect('--limit', effect)
-    return out
 
 
 def run(given: Given) -> int:

@@ -40,7 +40,11 @@ def run(given: Given) -> int:
         for drawing in drawings:
             print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
-    robots = _claims_robots(given)
+    from weld_twin_msgs_py.robots import load_robot
+
+    from ...sensitivity_report.study_files import ROBOTS
+
+    robots = [load_robot(name) for name in given.claims_robots or ROBOTS] if given.claims else []
     with (
         closing(pool_of(given.scheduler, given.workers or 0, ahead=_WORK)) as pool,
         progress('starting') as (_, tell),
@@ -129,14 +133,6 @@ def _tolerances(given: Given, robot: Robot) -> tuple[Tolerance, ...]:
         return tolerances_from_list(read_yaml(given.tolerances, 'tolerance file'), robot)
     except ModelError as error:
         raise ModelError(f"tolerance file '{given.tolerances}': {error}") from None
-
-
-def _claims_robots(given: Given) -> list[Robot]:
-    from weld_twin_msgs_py.robots import load_robot
-
-    from ...sensitivity_report.study_files import ROBOTS
-
-    return [load_robot(name) for name in given.claims_robots or ROBOTS] if given.claims else []
 
 
 def _print_summary(place: Path) -> None:

@@ -129,7 +129,11 @@ class Space:
         whole = _whole(self._robot, q)
         long = np.logical_or(whole.long, self._known.long)
         asked = whole.of(long)
-        near = np.minimum(self._as_usual(long), 0.0) - _ALIKE
+        # How near these capsules came in the postures that were seen.
+        key = long.tobytes()
+        if key not in self._usual:
+            self._usual[key] = _clearances(self._known.of(long)).min(axis=0)
+        near = np.minimum(self._usual[key], 0.0) - _ALIKE
         good = (_clearances(asked) >= near).all(axis=-1)
         ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
         if self._box is not None:
@@ -138,13 +142,6 @@ class Space:
         if not self._upright:
             return np.asarray(good)
         return np.asarray(good & (_lowest(ends @ self._up) >= self._foot))
-
-    def _as_usual(self, long: Array) -> Array:
-        """Return how near these capsules came in the postures that were seen, shape (pairs,)."""
-        key = long.tobytes()
-        if key not in self._usual:
-            self._usual[key] = _clearances(self._known.of(long)).min(axis=0)
-        return self._usual[key]
 
 
 def _lowest(heights: Array) -> Array:

@@ -146,12 +146,9 @@ class Effect(ABC):
         for parameter in self.parameters:
             value = getattr(self, parameter.name)
             if np.ndim(value):
-                object.__setattr__(self, parameter.name, self._frozen(parameter, value))
-
-    def _frozen(self, parameter: Parameter, value: Any) -> Array:
-        array: Array = np.array(self._numeric(parameter, value))
-        array.setflags(write=False)
-        return array
+                array: Array = np.array(self._numeric(parameter, value))
+                array.setflags(write=False)
+                object.__setattr__(self, parameter.name, array)
 
     def _numeric(self, parameter: Parameter, value: Any) -> Array:
         try:

@@ -339,7 +339,8 @@ class _Work:
         step = result.q[0] - here
         if np.abs(step).max() < _HERE:
             return 0.0
-        length, turn = np.abs(_largest(self._between(here, result.q[0])))
+        old, new = forward(self.bare, np.stack([here, result.q[0]]))
+        length, turn = np.abs(_largest(missing(new, old)[None]))
         most = np.minimum(self.model.robot.max_acceleration, self.limits.acceleration)
         needed = max(
             SMOOTH_SPEED * length / self.limits.rate,
@@ -360,10 +361,6 @@ class _Work:
         rate = self.goal.qd
         begins_at_rest = rate is not None and bool(np.abs(rate[0]).max() < _AT_REST)
         return self._near and (begins_at_rest or not self.start.moving)
-
-    def _between(self, here: Array, there: Array) -> Array:
-        old, new = forward(self.bare, np.stack([here, there]))
-        return missing(new, old)[None]
 
     # Reasons to refuse -----------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from ..arm.chain import forward
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
-from ..motion.programs import Move, Piece
+from ..motion.programs import Piece
 from ..recording import JointMotion, Recording, Signal
 from .compensation import acts, commandable
 from .domain import Domain, Outside
@@ -164,12 +164,8 @@ class ProgramModel:
         out: Array | None = None
         for key in dict.fromkeys(keys):
             chosen = np.array([k == key for k in keys])[piece.move[at]]
-            values = of(_tool(piece.moves, keys, key))
+            values = of(piece.moves[keys.index(key)].tool)
             out = values if out is None else out
             out[chosen] = values[chosen]
         assert out is not None
         return out
-
-
-def _tool(moves: tuple[Move, ...], keys: list[bytes], key: bytes) -> Array:
-    return moves[keys.index(key)].tool

@@ -107,7 +107,11 @@ class LiveTwin:
         q = self._checked(t, q)
         if not self._twin.effects:
             self._command.remember(t, q)
-            return q.copy(), self._nominal(q)
+            # Without effects a pose costs a tenth of what the stages do.
+            if self._single.robot is not self._twin.robot:
+                self._single = SinglePose(self._twin.robot)
+            pose = self._single(q)
+            return q.copy(), Poses(pose[:3, 3], pose[:3, :3])
         if qd is None:
             qd = self._command.since_before(t, q)
         else:
@@ -156,13 +160,6 @@ class LiveTwin:
             self._start = t
         self._last = t
         return q
-
-    def _nominal(self, q: Array) -> Poses:
-        """Return the pose without effects, at a tenth of what the stages cost."""
-        if self._single.robot is not self._twin.robot:
-            self._single = SinglePose(self._twin.robot)
-        pose = self._single(q)
-        return Poses(pose[:3, 3], pose[:3, :3])
 
     def _remembered(self, t: float, view: View) -> View:
         """Run the effects with memory, each on what the one before left, and keep their states."""

@@ -171,19 +171,14 @@ def _ends(result: list[TopicInfo]) -> dict[str, Ends]:
     }
 
 
-def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Return use and acceptable types by topic name; joints last, for one topic may tell both."""
-    return {
-        names.contact: ('contact', (CONTACT.type,)),
-        names.images: ('images', tuple(READ)),
-        **{split_topic(getattr(names, r.value))[0]: (r.value, t) for r, t in TYPES.items()},
-    }
-
-
 def _describe(
     name: str, kind: str, stamps: array[int], unstamped: int, names: TopicNames
 ) -> TopicInfo:
-    use, types = _uses(names).get(name, ('', ()))
+    use, types = {  # joints last, for one topic may tell both
+        names.contact: ('contact', (CONTACT.type,)),
+        names.images: ('images', tuple(READ)),
+        **{split_topic(getattr(names, r.value))[0]: (r.value, t) for r, t in TYPES.items()},
+    }.get(name, ('', ()))
     ns = np.frombuffer(stamps, dtype=np.int64)
     steps = np.diff(ns)
     forward = steps[steps > 0]

@@ -344,7 +344,13 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
                     damage.tell(file, _PARTED.format(back * 1e-9))
                 latest[topic] = log_ns
                 _write(segments, result, file, counts, damage)
-        segments.finish(_provenance(source, damage))
+        custom: dict[str, str] = {}
+        with suppress(Exception):  # it is beside a broken bag and may be broken itself
+            if (source / NOTES).is_file():
+                custom = custom_data(json.loads((source / NOTES).read_bytes()))
+            else:
+                custom = {str(key): str(value) for key, value in look(source).custom.items()}
+        segments.finish(custom | custom_data({'recovered': damage.sentences}))
     finally:
         segments.growing.abort()
     return counts
@@ -366,14 +372,3 @@ def _write(
         damage.tell(file, f'is recovered without some of its messages: {error}')
     else:
         counts[channel.topic] += 1
-
-
-def _provenance(source: Path, damage: Damage) -> dict[str, str]:
-    """Return what was noted about the making of the bag, and that it was recovered."""
-    custom: dict[str, str] = {}
-    with suppress(Exception):  # it is beside a broken bag and may be broken itself
-        if (source / NOTES).is_file():
-            custom = custom_data(json.loads((source / NOTES).read_bytes()))
-        else:
-            custom = {str(key): str(value) for key, value in look(source).custom.items()}
-    return custom | custom_data({'recovered': damage.sentences})

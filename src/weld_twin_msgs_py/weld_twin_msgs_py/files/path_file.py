@@ -23,7 +23,16 @@ def read_path(path: FilePath | str) -> tuple[Path, Torch]:
     """Return the seam of a YAML file, or the spline through the x, y, z [m] of a CSV file."""
     try:
         if FilePath(path).suffix.lower() == '.csv':
-            return from_mapping({'kind': 'points', 'points': _points(path)}), Torch()
+            rows = csv.DictReader(read_text(path, 'path file').splitlines(), skipinitialspace=True)
+            points = []
+            for row in _whole(rows):
+                try:
+                    points.append([float(row[axis]) for axis in 'xyz'])
+                except (KeyError, TypeError, ValueError):
+                    raise PathError(
+                        f'line {rows.line_num} must have numbers in the columns x, y, z'
+                    ) from None
+            return from_mapping({'kind': 'points', 'points': points}), Torch()
         data = read_yaml(path, 'path file')
         torch = data.get('torch') if isinstance(data, dict) else None
         return from_mapping(data), Torch.from_mapping(torch or {})
@@ -62,19 +71,6 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
     still = np.clip(np.zeros((len(external), robot.n)), robot.lower, robot.upper)
     robot.check_positions(np.concatenate([external, still[:, external.shape[1] :]], axis=1))
     return external
-
-
-def _points(path: FilePath | str) -> list[list[float]]:
-    rows = csv.DictReader(read_text(path, 'path file').splitlines(), skipinitialspace=True)
-    points = []
-    for row in _whole(rows):
-        try:
-            points.append([float(row[axis]) for axis in 'xyz'])
-        except (KeyError, TypeError, ValueError):
-            raise PathError(
-                f'line {rows.line_num} must have numbers in the columns x, y, z'
-            ) from None
-    return points
 
 
 def _whole(rows: csv.DictReader[str]) -> Iterator[dict[str, str]]:

@@ -67,25 +67,20 @@ def region(
             raise DataError(f"no move of the region '{given}' can be followed")
         q = np.concatenate(parts)
     else:
-        q = _in_box(robot, _box(given))
+        try:  # the lower and the upper corner of a box
+            numbers = [float(value) for value in given.replace(':', ',').split(',')]
+        except ValueError:
+            numbers = []
+        box = np.array(numbers).reshape(2, 3) * 1e-3 if len(numbers) == SIDES else np.zeros((2, 3))
+        if not (np.isfinite(box).all() and (box[1] > box[0]).all()):
+            raise DataError(
+                f"the region '{given}' is no bag, no program and no box; a box is written x,y,z:x,y,z, "
+                'its lower and its upper corner in the base frame in mm'
+            )
+        q = _in_box(robot, box)
     chosen = q[np.unique(np.linspace(0, len(q) - 1, min(POSTURES, len(q))).round().astype(int))]
     judged = np.unique(np.linspace(0, len(chosen) - 1, min(JUDGED, len(chosen))).round())
     return chosen[judged.astype(int)], chosen
-
-
-def _box(given: str) -> Array:
-    """Return the lower and the upper corner of a box, shape (2, 3) [m]."""
-    try:
-        numbers = [float(value) for value in given.replace(':', ',').split(',')]
-    except ValueError:
-        numbers = []
-    box = np.array(numbers).reshape(2, 3) * 1e-3 if len(numbers) == SIDES else np.zeros((2, 3))
-    if not (np.isfinite(box).all() and (box[1] > box[0]).all()):
-        raise DataError(
-            f"the region '{given}' is no bag, no program and no box; a box is written x,y,z:x,y,z, its "
-            'lower and its upper corner in the base frame in mm'
-        )
-    return box
 
 
 def _in_box(robot: Robot, box: Array) -> Array:

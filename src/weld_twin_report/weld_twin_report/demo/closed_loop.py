@@ -77,23 +77,19 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: floa
         f'{noise * 1e3:.3f} mm.'
     )
     lead = 'How far the measured tool is from where it was to be. Both runs have one scale.'
-    body = main(
-        ('Closed loop', ''),
-        robot,
-        head,
-        _figures(before, after),
-        section('Along the seam', *_charts(before, after), id_='seam', lead=lead),
-        section('How it was done', tag('p', how_done), id_='how'),
-    )
-    return document(f'Closed loop · {robot}', body, charts=True)
-
-
-def _figures(before: Seam, after: Seam) -> Html:
     rows = [
         (name, f'{one.rms * 1e3:.3f}', f'{one.worst * 1e3:.3f}')
         for name, one in (('as it is', before), ('corrected', after))
     ]
-    return table(('run', 'RMS, mm', 'at worst, mm'), rows)
+    body = main(
+        ('Closed loop', ''),
+        robot,
+        head,
+        table(('run', 'RMS, mm', 'at worst, mm'), rows),
+        section('Along the seam', *_charts(before, after), id_='seam', lead=lead),
+        section('How it was done', tag('p', how_done), id_='how'),
+    )
+    return document(f'Closed loop · {robot}', body, charts=True)
 
 
 def _charts(before: Seam, after: Seam) -> list[Html]:

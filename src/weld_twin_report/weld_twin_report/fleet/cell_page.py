@@ -57,10 +57,18 @@ def cell_page(
     runs = Runs(database)
     changes = runs.look(cell, entries)
     rows = [row(entry, CAUSES) for entry in entries[: -ROWS - 1 : -1]]
+    last = entries[-1]
+    sure = '' if last.confidence is None else f'{odds(last.confidence)} sure'
+    cells: list[Figure] = [
+        ('Verdict', last.status, sure),
+        ('Gap', millimetres(last.gap_m), 'without what was found'),
+        ('Left', millimetres(last.unexplained_m), 'with it'),
+        ('Recorded', str(last.at.date()), causes_of(last.effects, CAUSES)),
+    ]
     body = tag(
         'main',
         _head(cell, home, ways, f'{entries[-1].robot} · {_span(entries)}'),
-        tag('section#verdict', tag('h1', _headline(entries, changes)), _figures(entries)),
+        tag('section#verdict', tag('h1', _headline(entries, changes)), figures(cells)),
         _changed(changes),
         _charts(entries, changes),
         section('Last diagnoses', table(HEADS, rows), id_='diagnoses'),
@@ -110,19 +118,6 @@ def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) ->
     latest = max(changes, key=lambda change: str(change['date']))
     more = f' {len(changes) - 1} more below.' if len(changes) > 1 else ''
     return f'{str(latest["sentence"]).capitalize()}{more}'
-
-
-def _figures(entries: Sequence[Entry]) -> Html:
-    """Return the newest diagnosis in figures."""
-    last = entries[-1]
-    sure = '' if last.confidence is None else f'{odds(last.confidence)} sure'
-    cells: list[Figure] = [
-        ('Verdict', last.status, sure),
-        ('Gap', millimetres(last.gap_m), 'without what was found'),
-        ('Left', millimetres(last.unexplained_m), 'with it'),
-        ('Recorded', str(last.at.date()), causes_of(last.effects, CAUSES)),
-    ]
-    return figures(cells)
 
 
 def _changed(changes: Sequence[Mapping[str, Any]]) -> Html | None:

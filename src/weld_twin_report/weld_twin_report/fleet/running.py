@@ -300,7 +300,10 @@ def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str,
     if done.disk_full:
         state = FAILED
     if state == UNSOUND:
-        return state, _unsound(out), None
+        from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+
+        faults = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
+        return state, (str(faults[0]['sentence']) if faults else 'data or set-up are wrong'), None
     if state != DONE:
         return state, done.said.removeprefix('weld-twin: '), None
     try:
@@ -308,14 +311,6 @@ def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str,
     except TwinError as error:
         return REFUSED, str(error).replace(f'{out}/diagnosis.json', listed.recording), None
     return state, entry.status, entry.plain()
-
-
-def _unsound(out: Path) -> str:
-    """Return what is wrong with data or set-up."""
-    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
-
-    faults = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
-    return str(faults[0]['sentence']) if faults else 'data or set-up are wrong'
 
 
 def _warm(limits: Limits) -> Guarded:

@@ -92,11 +92,16 @@ def acceptance_section(page: Content) -> Html | None:
     rule = rule_of(diagnosis, demand)
     before = largest(diagnosis)
     heads = ('the robot', 'RMS', 'largest deviation', 'verdict')
+    parts = []
+    if len(switch_sets(diagnosis)) < 2 ** len(switches(diagnosis)):
+        parts.append('Any other combination: tick it under "What if".')
+    if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
+        parts.append('Where a cause has no name, mended means: programs corrected by its curve.')
     return section(
         'Does it pass',
         _field(rule),
         table(heads, _rows(diagnosis, rule), 'acceptance'),
-        _more(diagnosis),
+        tag('p.note', ' '.join(parts)) if parts else None,
         tag('p#remedy.note', _REMEDY, hidden=None if rule.judged(before) == OPEN else ''),
         tag('p.note', _rule_words(diagnosis, rule, demand)),
         _standard(diagnosis),
@@ -147,16 +152,6 @@ def _mended_words(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
         return f'mended: all {len(labels)} causes'
     only = 'only ' if len(labels) > 1 else ''
     return f'mended: {only}{listed([f"{k + 1}. {labels[k]}" for k in mended])}'
-
-
-def _more(diagnosis: Diagnosis) -> Html | None:
-    """Return where the other combinations are, and what mended means without a name."""
-    parts = []
-    if len(switch_sets(diagnosis)) < 2 ** len(switches(diagnosis)):
-        parts.append('Any other combination: tick it under "What if".')
-    if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
-        parts.append('Where a cause has no name, mended means: programs corrected by its curve.')
-    return tag('p.note', ' '.join(parts)) if parts else None
 
 
 def _row(name: str, rms: float, most: float, rule: Rule) -> tuple[Html | str, ...]:

@@ -27,9 +27,20 @@ def contacts_section(page: Content) -> Html | None:
     diagnosis, result = page.diagnosis, page.diagnosis.contacts
     if result is None:
         return None
+    rows = [
+        (
+            item.label,
+            str(item.postures),
+            *(millimetres(v) for v in (item.before_m, item.after_m, item.held_out_m)),
+        )
+        for item in result.touched
+    ]
+    every = (result.spread_before_m, result.spread_after_m, result.held_out_spread_m)
+    postures = sum(item.postures for item in result.touched)
+    rows.append(('all', str(postures), *(millimetres(v) for v in every)))
     return section(
         'Contacts',
-        _table(result),
+        table(('contact', 'postures', 'before', 'after', 'left out'), rows),
         _lengths(result),
         tag('div.clouds', *_pictures(diagnosis), style=_GRID),
         _not_seen(result),
@@ -53,21 +64,6 @@ def contacts_sentence(result: ContactResult) -> str:
 
 
 _GRID = 'display:grid;grid-template-columns:repeat(auto-fill,minmax(11rem,1fr));gap:1rem'
-
-
-def _table(result: ContactResult) -> Html:
-    rows = [
-        (
-            item.label,
-            str(item.postures),
-            *(millimetres(v) for v in (item.before_m, item.after_m, item.held_out_m)),
-        )
-        for item in result.touched
-    ]
-    every = (result.spread_before_m, result.spread_after_m, result.held_out_spread_m)
-    postures = sum(item.postures for item in result.touched)
-    rows.append(('all', str(postures), *(millimetres(v) for v in every)))
-    return table(('contact', 'postures', 'before', 'after', 'left out'), rows)
 
 
 def _lengths(result: ContactResult) -> Html | None:
@@ -114,9 +110,13 @@ def _picture(label: str, before: Array, after: Array) -> Html:
         for dot in _dots(cloud * (_SIZE / half), filled)
     ]
     edge = _SIZE * 1.05
+    cross = [
+        tag('line', x1=a, y1=b, x2=c, y2=d, stroke='currentColor', opacity='.2')
+        for a, b, c, d in ((-edge, 0.0, edge, 0.0), (0.0, -edge, 0.0, edge))
+    ]
     picture = tag(
         'svg',
-        *_cross(edge),
+        *cross,
         *dots,
         viewBox=f'{-edge} {-edge} {2 * edge} {2 * edge}',
         role='img',
@@ -142,13 +142,4 @@ def _dots(cloud: Array, filled: bool) -> list[Html]:
             stroke=colour,
         )
         for x, y in cloud
-    ]
-
-
-def _cross(edge: float) -> list[Html]:
-    """Return faint lines through the middle."""
-    ends = ((-edge, 0.0, edge, 0.0), (0.0, -edge, 0.0, edge))
-    return [
-        tag('line', x1=a, y1=b, x2=c, y2=d, stroke='currentColor', opacity='.2')
-        for a, b, c, d in ends
     ]

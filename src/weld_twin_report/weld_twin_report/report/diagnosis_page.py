@@ -275,10 +275,17 @@ def causes_table(answer: Answer) -> Html | None:
     if len(switches(diagnosis)) > 1:
         rows.append(_together(diagnosis, rule))
     top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
+    more = len(diagnosis.causes) - _CAUSES
+    words: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
+    count = len(switches(diagnosis))
+    if count > 2:
+        every = len(switch_sets(diagnosis)) == 2**count
+        name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
+        words += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
     return tag(
         'div.detail',
         tag('table.glance', tag('thead', top), tag('tbody', *rows)),
-        tag('p.note', _more(diagnosis)),
+        tag('p.note', joined([*words, 'A click on a cause leads to its card.'])),
     )
 
 
@@ -320,17 +327,6 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
         if len(advised(diagnosis)) == len(switches(diagnosis))
         else tag('td', 'not advised', data_head=_HEADS[-1]),
     )
-
-
-def _more(diagnosis: Diagnosis) -> Html:
-    more = len(diagnosis.causes) - _CAUSES
-    words: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
-    count = len(switches(diagnosis))
-    if count > 2:
-        every = len(switch_sets(diagnosis)) == 2**count
-        name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
-        words += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
-    return joined([*words, 'A click on a cause leads to its card.'])
 
 
 _FOLDED = 'For engineers: what else it could be, and how far each effect shrinks it'

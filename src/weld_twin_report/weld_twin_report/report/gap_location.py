@@ -41,7 +41,17 @@ _VISIBLE = 0.005
 def where_section(page: Content) -> Html:
     """Return where the causes lie, the same shares as theirs, and the map of each by itself."""
     answer, diagnosis = page.answer, page.diagnosis
-    parts = [_part('By direction', _directions(diagnosis))]
+    direction = dict(diagnosis.where.direction)
+    names = {'along_m': 'along the seam', 'across_m': 'across it', 'normal_m': 'along the tool'}
+    if at_rest(diagnosis):
+        direction = {key: value for key, value in direction.items() if key != 'along_m'}
+        names['across_m'] = 'across the tool'
+    largest = max([*direction.values(), 1e-12])
+    rows = [
+        (names.get(key, key), value / largest, millimetres(value))
+        for key, value in direction.items()
+    ]
+    parts = [_part('By direction', joined([bars(rows), _worst(diagnosis)]))]
     if diagnosis.status != 'none':
         parts[:0] = [
             _part('By place', bars(_places(answer))),
@@ -190,20 +200,6 @@ def _cell(share: float) -> Html:
     number, gap, unit = percent(share).rpartition('\N{NO-BREAK SPACE}')
     text = (number, tag('span.unit', gap, unit)) if share >= _VISIBLE else ()
     return tag('td', *text, style=f'--share:{strength:.3f}')
-
-
-def _directions(diagnosis: Diagnosis) -> Html:
-    direction = dict(diagnosis.where.direction)
-    names = {'along_m': 'along the seam', 'across_m': 'across it', 'normal_m': 'along the tool'}
-    if at_rest(diagnosis):
-        direction = {key: value for key, value in direction.items() if key != 'along_m'}
-        names['across_m'] = 'across the tool'
-    largest = max([*direction.values(), 1e-12])
-    rows = [
-        (names.get(key, key), value / largest, millimetres(value))
-        for key, value in direction.items()
-    ]
-    return joined([bars(rows), _worst(diagnosis)])
 
 
 def _worst(diagnosis: Diagnosis) -> Html | None:

@@ -30,6 +30,16 @@ Round = Mapping[str, Any]
 
 
 def investigation_page(state: Mapping[str, Any]) -> str:
+    rounds = state['rounds']
+    nodes: list[Html] = []
+    for k, step in enumerate(rounds):
+        after = rounds[k + 1] if k + 1 < len(rounds) else None
+        nodes.append(_believed(k, step))
+        if step['asked']:
+            nodes.append(_asked(step, after))
+    if state['state'] != 'open':
+        end = tag('p', tag('b', str(state['state'])), f': {state["why"]}')
+        nodes.append(tag('li.end', tag('h3', 'Ended'), end))
     body = main(
         ('Investigation ', str(state['state'])),
         str(state['robot']),
@@ -37,7 +47,7 @@ def investigation_page(state: Mapping[str, Any]) -> str:
         _figures(state),
         section(
             'The way there',
-            _tree(state),
+            tag('ol.way', *nodes),
             id_='way',
             lead='From top to bottom: what was believed, what was asked, and what came back. '
             'A fork shows the two explanations that a measurement was to part.',
@@ -75,20 +85,6 @@ def _figures(state: Mapping[str, Any]) -> Html:
         ('Decided', f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}', words),
     ]
     return figures(cells)
-
-
-def _tree(state: Mapping[str, Any]) -> Html:
-    rounds = state['rounds']
-    nodes: list[Html] = []
-    for k, step in enumerate(rounds):
-        after = rounds[k + 1] if k + 1 < len(rounds) else None
-        nodes.append(_believed(k, step))
-        if step['asked']:
-            nodes.append(_asked(step, after))
-    if state['state'] != 'open':
-        end = tag('p', tag('b', str(state['state'])), f': {state["why"]}')
-        nodes.append(tag('li.end', tag('h3', 'Ended'), end))
-    return tag('ol.way', *nodes)
 
 
 def _believed(number: int, step: Round) -> Html:
@@ -142,17 +138,6 @@ def _asked(step: Round, after: Round | None) -> Html:
         False: 'It did not decide that.',
     }
     answer = 'Not back yet.' if after is None else verdicts[asked['decided']]
-    return tag(
-        'li.asked',
-        tag('h3', f'Asked, {asked["minutes"]:.1f} minutes'),
-        text,
-        tag('p.note', _foreseen(asked)),
-        _fork(asked, after) if asked['between'] else None,
-        tag('p', tag('b', answer)),
-    )
-
-
-def _foreseen(asked: Mapping[str, Any]) -> str:
     parts = []
     if asked['stations']:
         parts.append(f'{asked["stations"]} stations')
@@ -162,7 +147,14 @@ def _foreseen(asked: Mapping[str, Any]) -> str:
     kind = str(asked.get('changes') or '').partition('=')[0]
     if kind in CHANGES:
         parts.append(f'with {CHANGES[kind]}')
-    return f'Said before: {"; ".join(parts)}.'
+    return tag(
+        'li.asked',
+        tag('h3', f'Asked, {asked["minutes"]:.1f} minutes'),
+        text,
+        tag('p.note', f'Said before: {"; ".join(parts)}.'),
+        _fork(asked, after) if asked['between'] else None,
+        tag('p', tag('b', answer)),
+    )
 
 
 def _fork(asked: Mapping[str, Any], after: Round | None) -> Html:

@@ -67,6 +67,11 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     shown = range(0 if diagnosis.contacts is not None else len(remaining))
     runs = [_run(diagnosis, k, remaining[k], parts[k]) for k in shown]
     top, floor = _large(diagnosis), diagnosis.gap.noise_floor_m
+    # Deviations are drawn 1, 2 or 5 times a power of ten larger than life.
+    points = np.concatenate([*diagnosis.traces.measured, np.zeros((0, 3))])
+    extent = float(np.ptp(points, axis=0).max()) if points.size else 1.0
+    wanted = max(_SHOWN * extent / top, 1.0)
+    power = 10 ** int(np.floor(np.log10(wanted)))
     return {
         'runs': runs,
         'joints': list(diagnosis.model.robot.joint_names),
@@ -74,7 +79,7 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
         'switches': [switch.label for switch in switches(diagnosis)],
         'squares': squares(diagnosis),
         'top': round(1e6 * top, 1),
-        'stretch': _stretch(diagnosis.traces.measured, top),
+        'stretch': int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001)),
         # Unsound stations have none.
         'floor': round(1e3 * floor, 5) if np.isfinite(floor) else None,
     }
@@ -126,15 +131,6 @@ _SHOWN = 0.04
 """Part of the seam's extent that a large deviation is drawn at."""
 
 
-def _stretch(measured: tuple[Array, ...], top: float) -> int:
-    """Return how much larger than life deviations are drawn: 1, 2 or 5 times a power of ten."""
-    points = np.concatenate([*measured, np.zeros((0, 3))])
-    extent = float(np.ptp(points, axis=0).max()) if points.size else 1.0
-    wanted = max(_SHOWN * extent / top, 1.0)
-    power = 10 ** int(np.floor(np.log10(wanted)))
-    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001))
-
-
 SEEN = 5e-4
 """Share of the squared gap below which a row would read 0.0 %."""
 
@@ -145,7 +141,9 @@ def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
     if any(cause.rest for cause in diagnosis.causes):
         # What is left has a row of its own, with the place where most of it is.
         return (('noise', rest.noise),)
-    remaining = max(_left_of_all(diagnosis) - rest.noise, 0.0)
+    products: Any = np.array(squares(diagnosis))  # the first is of what is left of all
+    whole = float(products.sum())
+    remaining = max((float(products[0, 0]) / whole if whole > 0.0 else 1.0) - rest.noise, 0.0)
     unnamed = rest.unexplained - remaining
     # What has a place and no name is not explained by that.
     named = bool(diagnosis.effects or diagnosis.families or not diagnosis.causes)
@@ -157,13 +155,6 @@ def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
 
 _SPLIT = 0.02
 """Share from which what is fitted without a name has a row of its own."""
-
-
-def _left_of_all(diagnosis: Diagnosis) -> float:
-    """Return what of the squared gap is left with everything that was fitted."""
-    products: Any = np.array(squares(diagnosis))
-    whole = float(products.sum())
-    return float(products[0, 0]) / whole if whole > 0.0 else 1.0
 
 
 def places(diagnosis: Diagnosis) -> int:

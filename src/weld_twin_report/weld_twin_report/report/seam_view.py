@@ -38,6 +38,11 @@ def seam_section(page: Content) -> Html | None:
         return None
     stations = at_rest(diagnosis)
     changes = bool(switches(diagnosis)) or bool(diagnosis.model.found)
+    count = len(diagnosis.traces.t)
+    charts = [_chart(diagnosis, k) for k in range(min(count, _RECORDINGS))]
+    more = count - len(charts)
+    note = tag('p.note', f'{more} more recordings are not drawn.') if more > 0 else None
+    title = 'Deviation by station' if stations else 'Deviation along the recording'
     return section(
         'What if' if switches(diagnosis) else ('The stations' if stations else 'The seam'),
         _switches(diagnosis),
@@ -46,7 +51,7 @@ def seam_section(page: Content) -> Html | None:
         _controls(stations),
         tag('p#instant.instant'),
         tag('noscript', tag('p', 'The pictures need scripts switched on.')),
-        _charts(diagnosis),
+        joined([tag('h3', title), *charts, note]),
         id_='seam',
         lead=f'{_STATIONS if stations else _LINE} Drag to turn; click it first, then the wheel '
         'or two fingers zoom.',
@@ -138,16 +143,6 @@ def _controls(stations: bool) -> Html:
             else f'▲ direction of travel (both ways where it goes to and fro)   {signs}',
         ),
     )
-
-
-def _charts(diagnosis: Diagnosis) -> Html:
-    """Return the deviation over time, a chart for each recording."""
-    count = len(diagnosis.traces.t)
-    charts = [_chart(diagnosis, k) for k in range(min(count, _RECORDINGS))]
-    more = count - len(charts)
-    note = tag('p.note', f'{more} more recordings are not drawn.') if more > 0 else None
-    title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation along the recording'
-    return joined([tag('h3', title), *charts, note])
 
 
 def _chart(diagnosis: Diagnosis, k: int) -> Html:

@@ -11,9 +11,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(),
-    package_data={
-        NAME: ['py.typed', '**/*.yaml', '**/*.csv', '**/*.css', '**/*.js', '**/LICENSE']
-    },
+    package_data={NAME: ['py.typed', '**/*.yaml', '**/*.xml']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),

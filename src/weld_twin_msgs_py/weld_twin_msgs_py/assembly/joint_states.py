@@ -40,18 +40,15 @@ class Beside:
             if first is None:
                 if name in self._others or not isfinite(at):
                     continue
-                self._others |= self._of_another(names)
+                # All of the robot's joints behind a prefix are another robot's.
+                last = self._own[-1]
+                prefixes = {name.removesuffix(last) for name in names if name.endswith(last)}
+                sets = ({prefix + own for own in self._own} for prefix in prefixes)
+                self._others |= {name for each in sets if each <= set(names) for name in each}
                 if name not in self._others:
                     self._first[name] = at
             elif abs(at - first) > MOVED and name not in self.moving:
                 self.moving.append(name)
-
-    def _of_another(self, names: Sequence[str]) -> set[str]:
-        """Return the names that are all of the robot's joints behind a prefix."""
-        last = self._own[-1]
-        prefixes = {name.removesuffix(last) for name in names if name.endswith(last)}
-        sets = ({prefix + own for own in self._own} for prefix in prefixes)
-        return {name for each in sets if each <= set(names) for name in each}
 
     @property
     def remark(self) -> str:

@@ -130,18 +130,14 @@ def parse_tree(text: str, path: Path | str) -> Tree:
     if 'xacro' in text and any('xacro' in str(item.tag) for item in root.iter()):
         raise ModelError(f"'{path}' is a xacro file; run 'xacro {path}' to make the URDF of it")
     try:
-        model = urdf.URDF.from_xml(_pruned(root), XmlPath('robot'))
+        out = Element('robot', {'name': root.get('name', 'robot')})
+        out.extend(_kept(item) for item in root if item.tag in ('link', 'joint'))
+        model = urdf.URDF.from_xml(out, XmlPath('robot'))
         return _tree(model)._replace(corrected=CORRECTED in text)
     except (ModelError, DataError) as error:
         raise ModelError(f"URDF '{path}': {error}") from None
     except Exception as error:  # the parser raises bare Exception and AssertionError
         raise ModelError(f"URDF '{path}': {' '.join(str(error).split())}") from None
-
-
-def _pruned(root: Element) -> Element:
-    out = Element('robot', {'name': root.get('name', 'robot')})
-    out.extend(_kept(item) for item in root if item.tag in ('link', 'joint'))
-    return out
 
 
 def _kept(item: Element) -> Element:

@@ -175,7 +175,15 @@ def _whole(path: Path, rows: list[_Row], said: list[str]) -> Lines:
     header, rows = rows[start].cells, rows[start + 1 :]
     while rows and _names_columns(header, rows[0].cells):
         header, rows = _joined(header, rows[0].cells), rows[1:]
-    _check_header(path, header)
+    if all(NUMBER.match(cell) for cell in header if cell):
+        raise DataError(
+            f"table '{path}' has numbers in its first line; put a header line above that names "
+            'the columns, such as J1,J2,J3,J4,J5,J6,x,y,z'
+        )
+    counts = Counter(header)
+    twice = sorted(name for name, count in counts.items() if count > 1 and name)
+    if twice:
+        raise DataError(f"table '{path}' has two columns called {twice[0]!r}; rename one")
     for row in rows:
         surplus = row.cells[len(header) :]
         if any(surplus) or any(header[len(row.cells) :]):
@@ -226,18 +234,6 @@ def _joined(header: Sequence[str], below: Sequence[str]) -> list[str]:
         else:
             out.append(f'{group} {own}'.strip())
     return out
-
-
-def _check_header(path: Path, header: list[str]) -> None:
-    if all(NUMBER.match(cell) for cell in header if cell):
-        raise DataError(
-            f"table '{path}' has numbers in its first line; put a header line above that names "
-            'the columns, such as J1,J2,J3,J4,J5,J6,x,y,z'
-        )
-    counts = Counter(header)
-    twice = sorted(name for name, count in counts.items() if count > 1 and name)
-    if twice:
-        raise DataError(f"table '{path}' has two columns called {twice[0]!r}; rename one")
 
 
 def _without_comments(lines: list[str]) -> list[str]:

@@ -404,7 +404,12 @@ def _ranking(case: _Case) -> dict[str, float]:
     out = {f'ST_{label}': total[label] for label in _ORDER}
     out['ST_half'] = float(result.total_half.max())
     out['rank_holds'] = all(total[a] > total[b] for a, b in pairwise(_ORDER))
-    return out | _stability(case) | _per_unit(case)
+    best = dict.fromkeys(_ORDER, 0.0)
+    for tolerance, value in zip(case.local.tolerances, case.local.peak, strict=True):
+        unit = 1e3 * DEGREE if tolerance.unit == 'rad' else 1.0
+        label = _GROUPS[tolerance.effect]
+        best[label] = max(best[label], float(value) * unit)
+    return out | _stability(case) | {f'unit_{label}': value for label, value in best.items()}
 
 
 def _stability(case: _Case) -> dict[str, float]:
@@ -420,16 +425,6 @@ def _stability(case: _Case) -> dict[str, float]:
         'rank_first_share': float((scaled.argmax(axis=1) == 0).mean()),
         **{f'contribution_{label}_m': v for label, v in zip(_ORDER, size, strict=True)},
     }
-
-
-def _per_unit(case: _Case) -> dict[str, float]:
-    """Return the strongest coefficient of each group per degree or per millimetre [mm]."""
-    best = dict.fromkeys(_ORDER, 0.0)
-    for tolerance, value in zip(case.local.tolerances, case.local.peak, strict=True):
-        unit = 1e3 * DEGREE if tolerance.unit == 'rad' else 1.0
-        label = _GROUPS[tolerance.effect]
-        best[label] = max(best[label], float(value) * unit)
-    return {f'unit_{label}': value for label, value in best.items()}
 
 
 _MEASURES: tuple[Callable[[_Case], dict[str, float]], ...] = (

@@ -52,7 +52,19 @@ def run(given: Given) -> int:
         some = any(move.get('moved_m') or move.get('turned_rad') for move in moves)
         if some and content.get('program') == what.name:
             raise corrected_twice(what.name, f"'{RESULT}' beside it says so")
-    return _corrected_program(given)
+    inputs = inputs_of(program=given.program, model=given.model)
+    robot = given.load_robot()
+    language = language_of(read_source(given.program), given.program, given.controller)
+    context = given.program_context(robot, language, given.model)
+    context = context._replace(beside=programs_beside(given.program, language))
+    program = read_program(given.program, context, language)
+    if given.model:
+        return _by_model(given, context, program, inputs)
+    entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
+    texts = {source.name: source.text.encode('latin-1') for source in program.sources}
+    given.write_results(RESULT, '', entry | {'language': language, 'model': None}, texts.items())
+    print(f'{given.out}: {len(program.steps)} moves in {language}, unchanged; no model was given')
+    return 0
 
 
 def _correction_in(folder: Path) -> dict[str, Any]:
@@ -110,23 +122,6 @@ def _corrected_bag(given: Given) -> int:
     if made.result.left_out:
         names = ', '.join(effect.name for effect in made.result.left_out)
         print(f'joint commands cannot mend {names}')
-    return 0
-
-
-def _corrected_program(given: Given) -> int:
-    """Read, correct, write; say what is expected."""
-    inputs = inputs_of(program=given.program, model=given.model)
-    robot = given.load_robot()
-    language = language_of(read_source(given.program), given.program, given.controller)
-    context = given.program_context(robot, language, given.model)
-    context = context._replace(beside=programs_beside(given.program, language))
-    program = read_program(given.program, context, language)
-    if given.model:
-        return _by_model(given, context, program, inputs)
-    entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
-    texts = {source.name: source.text.encode('latin-1') for source in program.sources}
-    given.write_results(RESULT, '', entry | {'language': language, 'model': None}, texts.items())
-    print(f'{given.out}: {len(program.steps)} moves in {language}, unchanged; no model was given')
     return 0
 
 

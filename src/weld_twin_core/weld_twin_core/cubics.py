@@ -38,24 +38,3 @@ def natural_slopes(x: Array, y: Array) -> Array:
     system[0, :2], system[-1, -2:] = (2.0, 1.0), (1.0, 2.0)
     wanted[0], wanted[-1] = 3.0 * chord[0], 3.0 * chord[-1]
     return np.asarray(np.linalg.solve(system, wanted))
-
-
-def slopes_of_many(x: Array, y: Array) -> Array:
-    """
-    Return slopes (N, n) of a spline of thousands of knots (N,), four at the least.
-
-    The first two and the last two pieces are one. No row of the equations is stored whole.
-    """
-    from scipy.linalg import solve_banded
-
-    h = np.diff(x)
-    chord = np.diff(y, axis=0) / h[:, None]
-    band, wanted = np.zeros((3, x.size)), np.empty(y.shape)
-    band[0, 2:], band[1, 1:-1], band[2, :-2] = h[:-1], 2.0 * (h[:-1] + h[1:]), h[1:]
-    wanted[1:-1] = 3.0 * (h[1:, None] * chord[:-1] + h[:-1, None] * chord[1:])
-    for row, beside, one, other in ((0, (0, 1), 0, 1), (-1, (2, -2), -1, -2)):
-        both = h[one] + h[other]
-        band[1, row], band[beside] = h[other], both
-        near, far = chord[one], chord[other]
-        wanted[row] = ((h[one] + 2.0 * both) * h[other] * near + h[one] ** 2 * far) / both
-    return np.asarray(solve_banded((1, 1), band, wanted))

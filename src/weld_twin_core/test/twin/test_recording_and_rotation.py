@@ -13,7 +13,7 @@ from scipy.stats.qmc import Halton
 
 from weld_twin_core import DataError, JointMotion, Measurements, Recording, Signal, rotation
 from weld_twin_core.arrays import halton
-from weld_twin_core.cubics import hermite, natural_slopes, slopes_of_many
+from weld_twin_core.cubics import hermite, natural_slopes
 
 vectors = st.tuples(*[st.floats(-1.7, 1.7)] * 3).map(np.array)
 
@@ -176,12 +176,6 @@ def test_pieces_with_given_slopes(knots):
 def test_a_natural_spline_bends_without_a_jump(knots):
     x, y, at = knots
     same(x, y, natural_slopes(x, y), at, CubicSpline(x, y, bc_type='natural'))
-
-
-def test_a_spline_through_many_knots_is_the_same(knots):
-    x, y, at = knots
-    same(x, y, slopes_of_many(x, y), at, CubicSpline(x, y))
-    same(x[:4], y[:4], slopes_of_many(x[:4], y[:4]), x[:4], CubicSpline(x[:4], y[:4]))
 
 
 def test_a_natural_spline_through_two_knots_is_a_line():

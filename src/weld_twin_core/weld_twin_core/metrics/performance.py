@@ -19,7 +19,6 @@ from ..arm.chain import forward
 from ..arm.robot import Robot
 from ..arm.rotation import nearest_rotation
 from ..arrays import Array
-from ..cubics import hermite, slopes_of_many
 from ..errors import DataError
 from ..recording import JointMotion, Measurements, Recording
 from .iso9283 import (
@@ -359,10 +358,12 @@ def _passes(measured: Measurements, ways: Array, along: Array, when: Array, span
 
 def _finer(t: Array, position: Array) -> tuple[Array, Array]:
     """Return measurements with points between them; those of a gap are not numbers."""
+    from scipy.interpolate import CubicSpline  # slow to load, and few motions repeat a path
+
     share = np.arange(_FINER) / _FINER
     steps = np.diff(t)
     dense = (t[:-1, None] + steps[:, None] * share).ravel()
-    points = hermite(t, position, slopes_of_many(t, position), dense)[0]
+    points = CubicSpline(t, position)(dense)
     points[np.repeat(steps > _GAP * np.median(steps), _FINER)] = np.nan
     return dense, points
 

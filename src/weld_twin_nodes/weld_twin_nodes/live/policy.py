@@ -18,6 +18,7 @@ from weld_twin_core.errors import DataError
 _TEXT = (files(__package__) / 'weld_twin.policy.xml').read_text(encoding='utf-8')
 _PROFILE = re.compile(r' *<enclave .*? node="(\w+)".*?</enclave>\n', re.DOTALL)
 _PROFILES = {each[1]: each[0] for each in _PROFILE.finditer(_TEXT)}
+"""What each node is allowed, as it stands in the file, by the node's name."""
 HEAD, TAIL = _PROFILE.sub('\0', _TEXT).split('\0' * len(_PROFILES))
 _NAMES = re.compile(r'(?: *<(topic|service|action)>.*</\1>\n)+')
 """Names of one permission, a line each."""

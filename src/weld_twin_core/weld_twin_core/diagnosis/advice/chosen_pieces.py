@@ -35,8 +35,6 @@ _GAIN = 0.05
 """A further piece has to add this share to the decision."""
 _NEAREST = 1e-3
 """Weight of what does not show yet against what does; its square is that of a second."""
-
-
 SAFE = _MARGIN * DECIDES
 
 

@@ -42,28 +42,18 @@ def next_experiment(
     named: int = 1,
 ) -> dict[str, Any] | None:
     """
-    Return the measurement to make next, as plain numbers and strings.
+    Return the measurement to make next, as plain numbers and strings; None if none can be foreseen.
 
-    problem, model, scale: the data at hand, the model with its frames, and the noise.
     alternatives: explanations that fit alike. With fewer than two there is nothing to decide
     between, and what widens the data most is proposed.
-    limits: what it may cost, and where it has to stay.
     closed: whether one of the alternatives is believed to be true. Where no motion parts them,
     this is then said; otherwise the data are widened.
     named: so many of the alternatives, the first ones, are named by the verdict: to part these
     comes first.
 
-    Returns
-    -------
-    dict or None
-        'kind', 'sentence', 'reason', 'expected_separation_sigma' (None where nothing is compared),
-        'cost' [min] and, of that, 'robot_minutes', 'stations' (None of a path), 'between' (the two
-        explanations it parts, each a list of effect, joint, place and dependence; None where nothing is
-        compared), 'changes' (of the cell, in the words that a diagnosis takes; empty: none) and
-        'motion': 'static', 'joint_names', 't' [s] and 'q' [rad, m]; 'motion' is None when no
-        motion decides. 'skipped' says which measurements could not be foreseen. None when none
-        could.
-
+    'cost' and, of that, 'robot_minutes' are in minutes. 'between', the two explanations that it
+    parts, and 'expected_separation_sigma' are None where nothing is compared, 'stations' of a path,
+    'motion' where no motion decides. 'skipped' says which measurements could not be foreseen.
     """
     limits = limits or Limits()
     joints = [e.site for effects in alternatives for e in effects if e.site]

@@ -201,14 +201,13 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
     for k, recording in enumerate(problem.recordings):
         contacts, measured = recording.touched, recording.seen
         rows = np.arange(_TRIED) % contacts.size
-        q, good = _reached(problem, model, [recording], measured.position[rows])
-        kept = np.flatnonzero(good)[:MOST]
+        q, kept = _reached(problem, model, [recording], measured.position[rows])
         if kept.size:
             rows = rows[kept]
             labels = tuple(contacts.labels[row] for row in rows)
             value = None if contacts.value is None else contacts.value[rows]
             touched = Contacts(contacts.artefact, labels, value)
-            yield k, _touching(recording, q[kept], measured.position[rows], touched)
+            yield k, _touching(recording, q, measured.position[rows], touched)
 
 
 def _beside(problem: Problem, model: Model) -> Iterator[Recording]:
@@ -227,18 +226,16 @@ def _beside(problem: Problem, model: Model) -> Iterator[Recording]:
             return
         known.append(point)
         targets = np.tile(point, (_TRIED, 1))
-        q, good = _reached(problem, model, problem.recordings, targets)
-        kept = np.flatnonzero(good)[:MOST]
-        if not kept.size:
-            continue
-        contacts = Contacts(Artefact((Contact(_NEW),)), (_NEW,) * kept.size)
-        yield _touching(problem.recordings[0], q[kept], targets[kept], contacts)
+        q, kept = _reached(problem, model, problem.recordings, targets)
+        if kept.size:
+            contacts = Contacts(Artefact((Contact(_NEW),)), (_NEW,) * kept.size)
+            yield _touching(problem.recordings[0], q, targets[kept], contacts)
 
 
 def _reached(
     problem: Problem, model: Model, recordings: Sequence[Recording], to: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return postures at targets, and which may be taken: as the tool has leaned in recordings."""
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return postures that may be taken, as the tool has leaned in recordings, and at which targets."""
     robot = model.robot
     low, high = widened(problem, robot)
     start = low + halton(robot.n, len(to)) * (high - low)
@@ -247,7 +244,8 @@ def _reached(
     leaned = np.concatenate([forward(robot, r.joints.q)[:, :3, 2] for r in recordings])
     middle = leaned.mean(axis=0) / max(float(np.linalg.norm(leaned.mean(axis=0))), FLAT)
     good &= forward(robot, q)[:, :3, 2] @ middle >= (leaned @ middle).min()
-    return q, good
+    kept = np.flatnonzero(good)[:MOST]
+    return q[kept], kept
 
 
 def _touching(recording: Recording, q: Array, points: Array, contacts: Contacts) -> Recording:

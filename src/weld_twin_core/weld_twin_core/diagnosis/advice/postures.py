@@ -83,7 +83,7 @@ class Room:
         q = np.concatenate([r.joints.q for r in problem.recordings])
         self._robot, self._limits = robot, limits
         self._seen = q[spread_over(len(q), 50)]
-        self._space = Space(robot, self._seen, limits.box)
+        self.free = Space(robot, self._seen, limits.box).free
         middle = np.median(problem.recordings[0].joints.q, axis=0)
         self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]
         inset = np.where(np.isfinite(robot.upper - robot.lower), STEP, 0.0)
@@ -105,9 +105,6 @@ class Room:
             'the box of the cell holds no posture near those recorded; give it more room, in the '
             'measuring frame and in metres'
         )
-
-    def free(self, q: Array) -> Array:
-        return self._space.free(q)
 
     def passed(self, q: Array) -> bool:
         """Return whether a motion that was recorded may be made again: it was free; in the box?"""

@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
-from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance, designed
-from ..algebra.fit import coordinates, frame_prior, trusted
+from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance
+from ..algebra.fit import coordinates, trusted
 from ..algebra.negligible import EMPTY, SLIGHT
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import profile
 from ..evidence import Search, Verdict
+from ..frames.changes import columns_and_ridge
 from ..levels.causes import covering
 from ..result import Cause, Found, Site
 from ..unseen.folds import COVERED
@@ -113,17 +114,15 @@ def covariance(
     problem: Problem, model: Model, scale: Scale, precision: Array, share: float
 ) -> Array:
     """Return the covariance of fit coordinates, (K, K); NaN for those that have none."""
-    columns = designed(problem, model, scale)
+    columns, ridge = columns_and_ridge(problem, model, scale, precision)
     count = coordinates(model).size
-    prior = precision if precision.size else np.zeros(count)
     live = np.concatenate([np.ones(columns.count - count, bool), _free(model)])
     live &= _visible(columns, model)
-    columns = columns.chosen(np.flatnonzero(live))
-    ridge = np.concatenate([frame_prior(problem, model)[0], prior])[live]
     residual = problem.whitened(problem.residuals(model), scale)
     out = np.full((live.size, live.size), np.nan)
     labels = problem.block_labels(BLOCKS)
-    out[np.ix_(live, live)] = columns_covariance(columns, ridge, residual, labels, share)
+    columns = columns.chosen(np.flatnonzero(live))
+    out[np.ix_(live, live)] = columns_covariance(columns, ridge[live], residual, labels, share)
     return out[live.size - count :, live.size - count :]
 
 

@@ -63,8 +63,7 @@ def aligned(
     model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
     counted = next((r.counted for r in recordings if r.counted is not None), None)
     model = replace(model, given=parts, counted=counted)
-    problem = posed([r for _, r in tracked], [r for _, r in touched], model, align)
-    return problem, model
+    return posed([r for _, r in tracked], [r for _, r in touched], model, align), model
 
 
 def by_place(recording: Recording) -> list[Recording]:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -55,17 +56,13 @@ def initial_frames(problem: Problem, model: Model) -> Model:
     """
     few, align = problem.thinned(ROWS), problem.align
     own = tracks(few, model)
-    if not align or _gap(own, model) < NEAR:
+    gap = partial(_gap, own)
+    if not align or gap(model) < NEAR:
         return model
-    best, attempts = model, [_base_only if 'base' in align else _tool_only]
-    if len(align) > 1:
-        attempts.append(lambda tracks, model: rough_frames([(tracks, model)], thorough=True)[0])
-    for attempt in attempts:
-        result = attempt(own, model)
-        if _gap(own, result) < _gap(own, best):
-            best = result
-        if _gap(own, best) < NEAR:
-            break
+    one_frame = _base_only if 'base' in align else _tool_only
+    best = min(model, one_frame(own, model), key=gap)
+    if len(align) > 1 and gap(best) >= NEAR:
+        best = min(best, *rough_frames([(own, model)], thorough=True), key=gap)
     return refined(few, best)
 
 
@@ -124,20 +121,19 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
     start = model.robot.T_flange_tool
     tool, weights = start, [np.ones(len(track.position)) for track in tracks]
     for _ in range(REWEIGHTED):
-        moment, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
+        moment, pull = np.zeros((3, 3)), np.zeros(3)
         for track, base, weight in zip(tracks, model.bases, weights, strict=True):
             axes = base[:3, :3]
             turn = axes @ track.turn
             if track.rotation is not None:
                 moment += np.einsum('m,mki,mkj', weight, turn, track.rotation)
             left = track.position - track.point @ axes.T - turn @ start[:3, 3] - base[:3, 3]
-            normal += np.einsum('m,mki,mkj', weight, turn, turn)
-            right += np.einsum('m,mki,mk', weight, turn, left)
+            pull += np.einsum('m,mki,mk', weight, turn, left)
         tie = max(SLIGHT * np.linalg.norm(moment), ROUNDING)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
-        total = sum(float(weight.sum()) for weight in weights)
-        vector = start[:3, 3] + np.linalg.solve(normal + SLIGHT * total * np.eye(3), right)
-        tool = transform(rotation, vector)
+        # The squares of turns are the unit matrix.
+        total = (1.0 + SLIGHT) * sum(float(weight.sum()) for weight in weights)
+        tool = transform(rotation, start[:3, 3] + pull / total)
         pairs = zip(tracks, model.bases, strict=True)
         weights = [1.0 / np.maximum(track.gap(base, tool), LEAST_NOISE) for track, base in pairs]
     return replace(model, robot=model.robot.with_frames(tool=tool))
@@ -270,17 +266,13 @@ def _reached(track: Track, vectors: Array) -> Array:
     return np.asarray(track.point[:, None] + flat.reshape(trials, -1, samples, 3))
 
 
-def _turned(track: Track, turn: Array) -> Array:
-    return np.asarray(track.turn @ turn[:, None])
-
-
 def _based(track: Track, start: Bases, turn: Array, vectors: Array, rounds: int) -> Bases:
     base, reached = start, _reached(track, vectors)
     position = track.position[:, None]
     weight = np.ones(reached.shape[:3])
     turns = None
     if track.rotation is not None:
-        turned = np.swapaxes(_turned(track, turn), -1, -2)
+        turned = np.swapaxes(track.turn @ turn[:, None], -1, -2)
         turns = LEVER**2 * (track.rotation @ turned).reshape(*turned.shape[:2], 9)
     for _ in range(rounds):
         weight = weight / weight.sum(axis=2, keepdims=True)
@@ -306,7 +298,7 @@ def _gaps(
     off = np.sqrt(((track.position[:, None] - there) ** 2).sum(axis=-1))
     if track.rotation is None:
         return np.asarray(off)
-    turned = base.rotation[:, :, None] @ _turned(track, turn)[:, None]
+    turned = base.rotation[:, :, None] @ (track.turn @ turn[:, None])[:, None]
     apart = track.rotation[:, None] - turned
     return np.asarray(off + LEVER * np.sqrt((apart**2).sum(axis=(-2, -1)) / 2.0))
 

@@ -148,13 +148,12 @@ def _chosen(
     share = problem.independent_share(residual)
     normal = share * columns @ columns.T + np.diag(ridge)
     parts = _places(problem, model)
-    own = np.zeros(x.size)
-    for part in parts:
-        own[part] = x[part]
+    fixed = np.setdiff1d(np.arange(x.size), np.concatenate([np.arange(0), *parts]))
+    own = x.copy()
+    own[fixed] = 0.0
     # What the candidates explain now is put back; frames and effects stay about where they are.
     right = share * columns @ (residual + own @ columns) - ridge * (x - own)
     trials = np.log(max(len(parts), 1))
-    fixed = np.setdiff1d(np.arange(x.size), np.concatenate([np.arange(0), *parts]))
     kept: list[int] = []
     now = _evidence(normal, right, ridge, fixed, [])
     while len(kept) < len(parts):
@@ -182,15 +181,14 @@ def _evidence(
     normal: Array, right: Array, ridge: Array, fixed: Array, parts: Sequence[Array]
 ) -> float:
     """Return the log evidence of some columns beside those that are always fitted."""
-    more = np.concatenate([np.zeros(0, dtype=int), *parts]).astype(int)
-    index = np.concatenate([fixed, more]).astype(int)
+    index = np.concatenate([fixed, *parts]).astype(int)
     if not index.size:
         return 0.0
     scaled, size = unit_diagonal(normal[np.ix_(index, index)], REPEATED)
     wanted = right[index] / size
     gain = float(wanted @ np.linalg.solve(scaled, wanted)) / 2.0
     volume = float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum()) / 2.0
-    return gain - volume + float(np.log(ridge[more]).sum()) / 2.0
+    return gain - volume + sum(float(np.log(ridge[part]).sum()) for part in parts) / 2.0
 
 
 def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -> Search:
@@ -226,7 +224,7 @@ def list_changes(
     """Return what differs between recordings beyond noise; frames fitted for each are compared here."""
     if not families:
         return ()
-    columns, ridge = _columns(problem, model, scale, precision)
+    columns, ridge = columns_and_ridge(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
     share = problem.independent_share(residual)
     whole = columns_covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
@@ -266,9 +264,10 @@ def _bases(
     return out
 
 
-def _columns(
+def columns_and_ridge(
     problem: Problem, model: Model, scale: Scale, precision: Array
 ) -> tuple[Columns, Array]:
+    """Return the columns of all that is fitted and their prior precision; of no effects, (0,), none."""
     columns = designed(problem, model, scale)
     prior = precision if precision.size else np.zeros(coordinates(model).size)
     return columns, np.concatenate([frame_prior(problem, model)[0], prior])
@@ -283,7 +282,7 @@ def list_undetectable(problem: Problem, model: Model, families: Sequence[str]) -
     scale = robust_scale(thin, thin.residuals(model))
     every = replace(thin, changes=candidates)
     free = replace(model, changes=candidates)
-    inverse, size = unit_inverse(*_columns(every, free, scale, effect_precision(model)))
+    inverse, size = unit_inverse(*columns_and_ridge(every, free, scale, effect_precision(model)))
     remaining = np.sqrt(np.diag(inverse)) / size
     out: dict[str, None] = {}
     for change, part in zip(candidates, _places(every, free), strict=True):

@@ -160,16 +160,15 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
         features = problem.features(model)
         span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
         residual = outside(problem.whitened(problem.residuals(model), scale), span)
-        best: tuple[float, Effect] | None = None
+        least, best = beliefs.setup_chi2, None
         for seed in features[moved_most(features, None)].seeds(kind, None)[0]:
-            own = problem.whitened(problem.effect_columns(features, seed), scale)
-            own = outside(own, span)
+            own = outside(problem.whitened(problem.effect_columns(features, seed), scale), span)
             size = np.linalg.lstsq(own.T, residual, rcond=None)[0]
             chi = float(residual @ (size @ own))
-            if best is None or chi > best[0]:
-                best = (chi, seed.from_atoms(size))
-        if best is not None and best[0] > beliefs.setup_chi2:
-            model = model.with_found((*model.found, best[1]))
+            if chi > least:
+                least, best = chi, seed.from_atoms(size)
+        if best is not None:
+            model = model.with_found((*model.found, best))
     return model
 
 

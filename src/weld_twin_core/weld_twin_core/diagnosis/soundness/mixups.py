@@ -20,14 +20,7 @@ from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
 from ...effects.compliance import JointCompliance
 from ...effects.effect import Effect
-from ...effects.geometry import (
-    ChannelError,
-    JointOffset,
-    LinkLength,
-    LinkOffset,
-    LinkTwist,
-    RootPose,
-)
+from ...effects.geometry import ChannelError, JointOffset, RootPose
 from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
 from .lengths import capital, distance, falls, length, listed
@@ -36,11 +29,6 @@ from .mending import frames_fitted
 from .slips import Slip
 from .snapshot import KINDS, LENGTHS, Arm, Snapshot, of_joints, rough_models
 from .suspicions import doubles, robots, suspicions, turned_bases
-
-GIVE_ITS_MODEL = (
-    'Give the model of the arm that was measured (siblings differ by as much); if it is this one, '
-    'and less precisely built than industrial arms are, put its own lengths into the robot file'
-)
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -299,17 +287,21 @@ def _foreign(robot: Robot, worst: Effect, why: str) -> Finding:
         f'The links are not those of {robot.name!r} as the model has it: {worst.channel} of '
         f'{str(worst.site)!r} differs by {size}{why}.'
     )
-    return mistake(words, 'other_robot', ('robot',), GIVE_ITS_MODEL)
+    remedy = (
+        'Give the model of the arm that was measured (siblings differ by as much); if it is this one, '
+        'and less precisely built than industrial arms are, put its own lengths into the robot file'
+    )
+    return mistake(words, 'other_robot', ('robot',), remedy)
 
 
 def _other_links(shot: Snapshot) -> Finding | None:
     """Return that the lengths of the links are those of another arm; None where they are not."""
     # What an arm can have leaves less than LARGE: more is no noise that would excuse anything.
-    own = (JointOffset, LinkTwist)
+    own = [kind for kind in KINDS if kind.name not in LENGTHS]
     remaining = _borne(shot, shot.bent(of_joints(shot.robot, (*own, JointCompliance)), 1.0, LARGE))
     if remaining < LARGE:
         return None
-    errors = of_joints(shot.robot, (*own, LinkLength, LinkOffset))
+    errors = of_joints(shot.robot, KINDS)
     sizes = [e.fit.coordinates().size for e in errors]
     lengths = np.repeat([e.name in LENGTHS for e in errors], sizes)
     for wider in (WIDER, WIDER**3):  # within a family, and of an arm of another size

@@ -106,15 +106,11 @@ class Unseen:
     def along(self, columns: Array) -> Unseen:
         """Return the same with something fitted along at zero, as large as believed, (E, rows)."""
         count, more = self.columns.count, len(columns)
-
-        def taken() -> Array:
-            return np.concatenate([self.taken(), np.zeros((1, self.residual.size))])
-
         return replace(
             self,
             columns=Columns((*self.columns.pieces, Piece(columns))),
             parts=(*self.parts, slice(count, count + more)),
-            taken=cache(taken),
+            taken=cache(lambda: np.pad(self.taken(), ((0, 1), (0, 0)))),
             precision=np.concatenate([self.precision, np.ones(more)]),
             pull=np.concatenate([self.pull, np.zeros(more)]),
         )

@@ -598,11 +598,9 @@ class Diagnosis:
         }
 
     def _unexplained(self) -> dict[str, Any]:
-        remaining = self.unexplained
         return {
-            'rms_m': remaining.rms_m,
-            'above_noise': remaining.above_noise,
-            'structure': list(remaining.structure),
+            **vars(self.unexplained),
+            'structure': list(self.unexplained.structure),
             'share': self.shares.unexplained,
             'noise_share': self.shares.noise,
         }

@@ -170,8 +170,7 @@ def _longer(plan: Plan, asked: Sequence[Parting], more: Sequence[int]) -> Plan:
 
 def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> Plan:
     """Return a measurement that shows more of the arm than the data, whatever is in doubt."""
-    still = problem.at_rest
-    wanted = ('bidirectional', 'stations') if still else ('path',)
+    wanted = ('bidirectional', 'stations') if problem.at_rest else ('path',)
     room = 60.0 * min(limits.minutes, limits.moving)
     for kind in wanted:
         plan = Plan(next(option for option in options if option.kind == kind), ())

@@ -82,7 +82,7 @@ def answer(
         indistinguishable=verdict.sets,
         candidates=_weighed_candidates(result, evidence),
         shrink=shrink,
-        unexplained=_unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
+        unexplained=_unexplained(result.work.beliefs, evidence, shrink, placing),
         next_experiment=None
         if limits is None
         else next_step(result, verdict, limits, alternative),
@@ -206,7 +206,7 @@ def _position_rms(result: Search, alternative: Alternative) -> float:
 
 
 def _unexplained(
-    beliefs: Beliefs, evidence: Evidence, verdict: Verdict, shrink: Shrink, placing: FreeForm
+    beliefs: Beliefs, evidence: Evidence, shrink: Shrink, placing: FreeForm
 ) -> Unexplained:
     """Return what remains after the verdict, and what that, or an unknown gap itself, depends on."""
     case = Left(evidence, beliefs)

@@ -86,13 +86,12 @@ def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]
 
 def _held_out(unseen: Unseen) -> dict[str, Array]:
     """Return distances from every contact as predicted where it was not fitted."""
-    recordings, parts = unseen.problem.recordings, unseen.problem.by_sample(unseen.whole)
+    parts = unseen.problem.measured_rows(unseen.whole, unseen.scale)
     out: dict[str, Array] = {}
-    for recording, part, weight in zip(recordings, parts, unseen.scale.weights, strict=True):
+    for recording, rows in zip(unseen.problem.recordings, parts, strict=True):
         contacts = recording.contacts
         if contacts is None:
             continue
-        rows = part * unseen.scale.position / np.sqrt(weight)[:, None]
         for label in dict.fromkeys(contacts.labels):
             index = contacts.of(label)
             own = rows[index]

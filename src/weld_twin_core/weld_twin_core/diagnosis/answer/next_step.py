@@ -74,7 +74,7 @@ def _parting(
     closed = verdict.status == 'ambiguous' and verdict.sure and len(listed) > 1
     if not closed:
         room = Room(result.work.problem, result.small.model.robot, limits)
-        shapes = _without_names(result, alternative, room.low, room.high)
+        shapes = _without_names(alternative, room.low, room.high)
         if verdict.status == 'unknown' and verdict.confidence >= LIKELIER:
             listed, named = [*shapes, *listed], 1
         else:
@@ -121,14 +121,9 @@ def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[Explanat
     """Return the explanations with an alternative in an effect's place: those named, or the others."""
     sites = {site for group in verdict.sets for site in group}
     own = result.small.model.found
-    alternatives = [
-        alternative
-        for candidate_set in result.candidate_sets
-        for alternative in candidate_set
-        if (alternative.site in sites) is named
-    ]
-    alternatives.sort(key=lambda alternative: -alternative.probability)
-    fits = [alternative.fit.model.found for alternative in alternatives]
+    every = chain.from_iterable(result.candidate_sets)
+    asked = [one for one in every if (one.site in sites) is named]
+    fits = [one.fit.model.found for one in sorted(asked, key=lambda one: -one.probability)]
     return [effects for effects in fits if effects != own]
 
 
@@ -141,9 +136,7 @@ def _beside(result: Search) -> list[Explanation]:
     return [(*model.found, choice.effect()) for choice in more[: CAUSES - 1]]
 
 
-def _without_names(
-    result: Search, alternative: Curved | None, low: Array, high: Array
-) -> list[Explanation]:
+def _without_names(alternative: Curved | None, low: Array, high: Array) -> list[Explanation]:
     """Return the free-form explanation and those nearest; curves go on from low to high."""
     if alternative is None:
         return []

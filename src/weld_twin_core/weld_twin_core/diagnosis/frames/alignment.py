@@ -225,7 +225,7 @@ def in_turn(
     bases: where the base of every recording is believed to be, shape (T, 4, 4).
     turn, vectors: of the tool, (T, 3, 3), which stays, and to start from, (T, S, 3) [m].
     """
-    result = _started(bases, vectors)
+    result = [Bases(base[:, None, :3, :3], base[:, None, :3, 3]) for base in bases]
     for _ in range(REWEIGHTED):
         result = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, result, strict=True)]
         vectors = _vectors(tracks, result, turn, vectors)
@@ -242,21 +242,10 @@ def in_turn(
 def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> tuple[Array, ...]:
     """Return the base frames of known tools, each (T, 4, 4); see `in_turn`."""
     turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
-    pairs = zip(tracks, _started(bases, vectors), strict=True)
+    starts = [Bases(base[:, None, :3, :3], base[:, None, :3, 3]) for base in bases]
+    pairs = zip(tracks, starts, strict=True)
     result = [_based(*pair, turn, vectors, REWEIGHTED) for pair in pairs]
     return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in result)
-
-
-def _started(bases: Sequence[Array], vectors: Array) -> list[Bases]:
-    """Return base frames (T, 4, 4) as those of every start."""
-    starts = vectors.shape[:2]
-    return [
-        Bases(
-            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
-            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
-        )
-        for b in bases
-    ]
 
 
 def _reached(track: Track, vectors: Array) -> Array:

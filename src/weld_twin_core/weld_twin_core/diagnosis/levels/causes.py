@@ -37,9 +37,6 @@ noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered
 88 % are."""
 
 
-Members = tuple[int, ...]
-
-
 def causes(
     result: Search,
     unseen: Unseen,
@@ -87,7 +84,7 @@ def causes(
 
 
 def _cause(
-    members: Members,
+    members: tuple[int, ...],
     place: Mapping[str, float],
     dependence: Mapping[str, float],
     name: Mapping[Site, float],
@@ -168,9 +165,11 @@ def _nameless(
     curves_at = _curves_by_place(places, curved) if places else {}
     claims, remaining = list(named), list[Part]()
     taken = {at for claim in named for at in claim.members}
-    if taken_out := result.lacking:
+    if result.lacking:
+        taken_out = result.lacking[0]
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
-        stand_in = _stand_in(taken_out[0], beside, model)
+        curves = {Site.of(model[k]): 1.0 for k in beside if model[k].traits.bends}
+        stand_in = _cause(beside, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
         return ([*claims, stand_in], _rest([])) if beside else (claims, stand_in)
     by_curves = {at for members in curves_at.values() for at in members}
     for k, effect in enumerate(model if curved is not None else ()):
@@ -193,26 +192,19 @@ def _nameless(
     return claims, _rest(remaining)
 
 
-def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> Cause:
-    """Return what has no name where something taken out fits clearly better: at its place."""
-    curves = {Site.of(model[k]): 1.0 for k in members if model[k].traits.bends}
-    return _cause(members, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
-
-
 def _rest(remaining: list[Part]) -> Cause:
     """Return what is left beside everything reported, where the most of it is."""
     if not remaining:
         return _cause((), {}, {}, {})
-    places = _by_place(remaining)
-    own = max(places.values(), key=lambda parts: sum(part.share for part in parts))
+    own = max(_by_place(remaining).values(), key=lambda own: sum(part.share for part in own))
     return _cause((), _place_of(own), _dependence_of(own), {})
 
 
 def _curves_by_place(
     places: dict[str, list[Part]], alternative: Curved | None
-) -> dict[str, Members]:
+) -> dict[str, tuple[int, ...]]:
     """Return the curves of the model that stand for each place; the largest has what is over."""
-    out: dict[str, Members] = dict.fromkeys(places, ())
+    out: dict[str, tuple[int, ...]] = dict.fromkeys(places, ())
     if alternative is None:
         return out
     largest = max(places, key=lambda place: sum(part.share for part in places[place]))

@@ -335,15 +335,11 @@ class _Case:
 
     def _alike(self, own: Sequence[int]) -> list[list[int]]:
         """Return members of a kind in groups of those that are one and the same error everywhere."""
-        out: list[list[int]] = []
+        out: dict[int, list[int]] = {}
         for k in own:
-            for group in out:
-                if self._same(group[0], k):
-                    group.append(k)
-                    break
-            else:
-                out.append([k])
-        return out
+            first = next((one for one in out if self._same(one, k)), k)
+            out.setdefault(first, []).append(k)
+        return list(out.values())
 
     def _same(self, one: int, other: int) -> bool:
         first, second = self.effects[one], self.effects[other]

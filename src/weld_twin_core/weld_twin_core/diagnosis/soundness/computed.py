@@ -20,7 +20,7 @@ from ..algebra.independent_rows import SAME_STATION, robust_spread
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
 from .evidence import Case, Finding, mistake, note
-from .lengths import length, middle
+from .lengths import distance, length, middle_of_each
 from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, NOISE, SAMPLES, STEPS, UNEXPLAINED, WORTH
 from .stamps import written
 
@@ -108,7 +108,8 @@ def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
 def _gap(problem: Problem, model: Model) -> float:
     """Return the median distance that is left [m], made up for what the fit took."""
     taken = _count(problem, model) / problem.size
-    return middle(problem.residuals(model)) / float(np.sqrt(1.0 - taken))
+    off = middle_of_each([distance(part) for part in problem.residuals(model)])
+    return off / float(np.sqrt(1.0 - taken))
 
 
 def _rounding(problem: Problem, model: Model) -> float:

@@ -83,22 +83,17 @@ def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
     gap = loads.measured - loads.statics
     spread = loads.statics - loads.statics.mean(axis=1, keepdims=True)
     size = np.sqrt((spread**2).mean(axis=1))
-    factors = _factors(loads, size) if robot.mass is not None else {}
+    weighed = robot.mass is not None
+    factors = _factors(loads, size) if weighed else {}
     whole = float(np.sqrt((spread**2).mean()))
     joints = tuple(
         JointEffort(name, float(size[i]), float(np.sqrt((gap[i] ** 2).mean())), factors.get(i))
         for i, name in enumerate(robot.joint_names)
     )
     difference = float(np.sqrt((gap**2).mean())) / whole if whole > 0.0 else 0.0
-    result = robot.mass is not None and difference > AGREES
-    return Efforts(
-        recordings[0].effort_holds,
-        loads.correlation(),
-        robot.mass is not None,
-        joints,
-        difference,
-        _causes(loads, gap) if result else (),
-    )
+    causes = _causes(loads, gap) if weighed and difference > AGREES else ()
+    sign = recordings[0].effort_holds, loads.correlation()
+    return Efforts(*sign, weighed, joints, difference, causes)
 
 
 def efforts(case: Case) -> Sequence[Finding]:
@@ -223,12 +218,12 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     plain = [np.zeros((0, *gap.shape)), *(_only(i, loads.beside) for i in range(len(names)))]
     nuisance = np.concatenate(plain)
     before = _fitted(nuisance, gap)[2]
-    offered: list[tuple[str, str | None, Array]] = [('payload', None, loads.payload)]
-    offered += [
-        ('torque_constant', name, _only(i, loads.statics[None])) for i, name in enumerate(names)
+    offered: list[tuple[str, str | None, Array]] = [
+        ('payload', None, loads.payload),
+        *(('torque_constant', n, _only(i, loads.statics[None])) for i, n in enumerate(names)),
+        *(('link_mass', n, loads.links[[i]]) for i, n in enumerate(names)),
+        ('link_masses', None, loads.links.sum(axis=0)[None]),
     ]
-    offered += [('link_mass', name, loads.links[[i]]) for i, name in enumerate(names)]
-    offered += [('link_masses', None, loads.links.sum(axis=0)[None])]
     result, every = [], np.concatenate([*(columns for *_, columns in offered), nuisance])
     noise = _fitted(every, gap)[2]
     for name, joint, columns in offered:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -119,14 +119,12 @@ class Case:
         return [new if _believed(old, new) else None for old, new in pairs]
 
     def _lags(self, model: Model, *, wide: bool) -> list[Lag | None]:
-        out: list[Lag | None] = []
+        out: list[Lag | None] = [None] * len(self.recordings)
         for k, recording in enumerate(self.recordings):
             t, seen = recording.joints.t, recording.seen
-            if recording.joints.static or t.size < ENOUGH:
-                out.append(None)
-                continue
-            path = model.twin(k).poses(recording, t).position
-            out.append(lag(t, path, seen.t, seen.position, wide=wide))
+            if not recording.joints.static and t.size >= ENOUGH:
+                path = model.twin(k).poses(recording, t).position
+                out[k] = lag(t, path, seen.t, seen.position, wide=wide)
         return out
 
     def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:
@@ -169,6 +167,3 @@ def _believed(before: Lag | None, after: Lag | None) -> bool:
     if before is None or after is None or abs(after.rate) > FEW:
         return False
     return HALVED * after.after < before.before and after.after < UNEXPLAINED
-
-
-Checker = Callable[[Case], Iterable[Finding]]

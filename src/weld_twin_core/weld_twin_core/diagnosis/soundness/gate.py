@@ -9,7 +9,7 @@ does a diagnosis go on with the data so mended.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from ..frames.changes import with_changes
 from ..result import Check, Unsound
 from .computed import computed, source
 from .efforts import efforts
-from .evidence import Case, Checker, Finding, mistake
+from .evidence import Case, Finding, mistake
 from .images import images
 from .limits import FEW, MOST
 from .mending import Given, as_entry
@@ -49,7 +49,7 @@ def readings(case: Case) -> Sequence[Finding]:
     return [each for each in mixups(case) if each.mend] or still if still else []
 
 
-CHECKS: dict[str, tuple[Checker, str]] = {
+CHECKS: dict[str, tuple[Callable[[Case], Iterable[Finding]], str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (readings, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
@@ -155,22 +155,20 @@ def examine(
     """
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid
-        result = streams(trial)
-        look = _Look()
-        if not result:
+        look = _Look(mistakes=streams(trial))
+        if not look.mistakes:
             # Known effects of another robot mean nothing on this one.
             own = known if trial.robot.joint_names == given.robot.joint_names else ()
             posed = aligned(trial.recordings, trial.robot, trial.align, tuple(own))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
-            result = look.mistakes
         earlier = {each.sentence for each in mistakes}
-        fresh = [each for each in result if each.sentence not in earlier]
+        fresh = [each for each in look.mistakes if each.sentence not in earlier]
         mistakes += fresh
-        if not fresh or any(each.mend is None for each in fresh):
+        mends = [each.mend for each in fresh if each.mend is not None]
+        if not fresh or len(mends) < len(fresh):
             break
-        for each in fresh:
-            if each.mend is not None:
-                trial = each.mend(trial)
+        for mend in mends:
+            trial = mend(trial)
     done = apply and look.posed is not None and all(m.mend is not None for m in mistakes)
     return Examined(
         trial if done else given,

@@ -22,7 +22,7 @@ from ...cameras.sightings import Fitted, located
 from ...errors import DataError
 from ..algebra.definite import outside, span_of
 from ..algebra.problem import ROWS
-from .evidence import Case, Finding, mistake
+from .evidence import Case, Finding, mistake, note
 from .limits import ENOUGH, FEW, HALVED, STRAY, WORTH
 
 IMAGE_FAR = 1.5
@@ -43,11 +43,8 @@ def images(case: Case) -> Sequence[Finding]:
     result = [finding for one in seen for finding in _by_themselves(one)]
     if result or not seen:
         return result
-    said = [
-        Finding('note', f'Points are found within {one.fitted.pixel:.2f} px.')
-        for one in seen
-        if one.fitted is not None
-    ]
+    pixels = (one.fitted.pixel for one in seen if one.fitted is not None)
+    said = (note(f'Points are found within {pixel:.2f} px.') for pixel in pixels)
     return [*_beside_the_arm(case), *said]
 
 

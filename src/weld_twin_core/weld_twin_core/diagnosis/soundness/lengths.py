@@ -19,11 +19,6 @@ def distance(part: Array) -> Array:
     return np.asarray(np.linalg.norm(part[:3], axis=0))
 
 
-def middle(parts: Sequence[Array]) -> float:
-    """Return the median length of the position part of residuals (c, M) [m]."""
-    return float(np.median(np.concatenate([distance(part) for part in parts])))
-
-
 def swept(motions: Sequence[Array]) -> tuple[NDArray[np.bool_], ...]:
     """
     Return the samples in which a joint moved that rests in most others, for each such joint.
@@ -37,7 +32,7 @@ def swept(motions: Sequence[Array]) -> tuple[NDArray[np.bool_], ...]:
     return tuple(own for own in moved.T if RUN <= np.count_nonzero(own) < len(q) // 2)
 
 
-def middle_of_each(sizes: Sequence[Array], some: Iterable[NDArray[np.bool_]]) -> float:
+def middle_of_each(sizes: Sequence[Array], some: Iterable[NDArray[np.bool_]] = ()) -> float:
     """Return the median of what every recording has of each sample, or that of some if it is more."""
     whole = np.concatenate(sizes)
     return max([float(np.median(whole)), *(float(np.median(whole[own])) for own in some)])

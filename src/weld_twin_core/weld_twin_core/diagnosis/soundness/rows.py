@@ -124,6 +124,9 @@ class _Stations(NamedTuple):
         certain = kept.size >= (1.0 - FEW) * count
         make = partial(repaired, k=k, reading=kept, station=found.station[kept], count=count)
         off = int(np.count_nonzero(np.diagonal(apart) > UNEXPLAINED))
+        done = (
+            '; --apply does, and leaves out those that have none or stand twice' if certain else ''
+        )
         return mistake(
             f'Measurements and joints of {self.recording.name} do not belong together row by row: '
             f'{listed([_words(*step) for step in found.steps])}. {off} of {count} stations are more '
@@ -131,12 +134,7 @@ class _Stations(NamedTuple):
             f'{int(np.count_nonzero(~found.agrees))} where each reading is put beside its station.',
             'other',
             ('instrument',),
-            'Put each reading beside the station where it was taken'
-            + (
-                '; --apply does, and leaves out those that have none or stand twice'
-                if certain
-                else ''
-            ),
+            f'Put each reading beside the station where it was taken{done}',
             make if certain else None,
             of_all=False,
         )

@@ -214,14 +214,13 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
 def _of_arm(problem: Problem, model: Model, features: list[Features]) -> list[Array]:
     """Return columns of all that an arm and the scale of its instrument do, (P, c, M) per recording."""
     view = features[moved_most(features, None)].view
-    out: list[list[Array]] = [[] for _ in features]
+    parts = []
     for effect in (*plain_causes(model.robot, view, LASTING), MeasurementScale()):
         size = WIDER * spreads(model.robot, effect)
         known = np.isfinite(size)
         columns = problem.effect_columns(features, effect, atoms=False)
-        for own, part in zip(out, columns, strict=True):
-            own.append(part[known] * size[known, None, None])
-    return [np.concatenate(own) for own in out]
+        parts.append([part[known] * size[known, None, None] for part in columns])
+    return [np.concatenate(own) for own in zip(*parts, strict=True)]
 
 
 def _scale(parts: list[Array]) -> Scale:
@@ -274,13 +273,6 @@ def _solved(right: Array, normal: Array) -> Array:
     scaled = normal / (size[:, :, None] * size[:, None, :]) + TIED * np.eye(mass.shape[1])
     unit = (right / size)[:, :, None]
     return np.asarray(np.linalg.solve(scaled, unit)[:, :, 0] / size)
-
-
-def other_shapes(age: Array) -> list[Array]:
-    """Return smooth shapes over age (M,), from 0 to 1, that are no settling, each (M,)."""
-    waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
-    late = [np.exp(-(1.0 - age) / constant) for constant in CONSTANTS]
-    return [age, age**2, *late, *waves]
 
 
 @dataclass(frozen=True, eq=False)
@@ -419,7 +411,9 @@ class _Seen:
         """Return smooth changes of a recording, by time constant; 0 where none settles."""
         age = self._age(k)
         out = [(constant, np.exp(-age / constant)) for constant in CONSTANTS.tolist()]
-        out += [(0.0, shape) for shape in other_shapes(age)]
+        late = [np.exp(-(1.0 - age) / constant) for constant in CONSTANTS]
+        waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
+        out += [(0.0, shape) for shape in (age, age**2, *late, *waves)]
         # It may have moved between recordings, not within one.
         out += [(MOVED_BEFORE, np.ones(age.size))] if len(self.problem.recordings) > 1 else []
         return [(constant, self._in_recording(shape, k)) for constant, shape in out]

@@ -165,11 +165,7 @@ def _knots(features: list[Features], index: int, on: str) -> tuple[float, ...] |
     if on == 'temperature' and any(m.view.temperature is None for m in features):
         return None
     values = [QUANTITIES[on](m.view, index) for m in features]
-    low = min(float(v.min()) for v in values)
-    high = max(float(v.max()) for v in values)
-    if high - low <= LEAST.get(on, 0.0):
-        return None
-    return tuple(float(k) for k in np.linspace(low, high, KNOTS[on]))
+    return _spaced(values, KNOTS[on], LEAST.get(on, 0.0))
 
 
 Plain = tuple[str, str, list[Array], tuple[Effect, ...]]

@@ -112,9 +112,13 @@ def _gap(tracks: list[Track], model: Model) -> float:
 
 
 def _base_only(tracks: list[Track], model: Model) -> Model:
-    tools, starts = model.robot.T_flange_tool[None], [base[None] for base in model.bases]
-    result = bases_of([Track.side_by_side([track]) for track in tracks], starts, tools)
-    return replace(model, bases=tuple(base[0] for base in result))
+    tool, bases = model.robot.T_flange_tool[None], []
+    for track, given in zip(tracks, model.bases, strict=True):
+        start = Bases(given[None, None, :3, :3], given[None, None, :3, 3])
+        own = Track.side_by_side([track]), start, tool[:, :3, :3], tool[:, None, :3, 3]
+        base = _based(*own, REWEIGHTED)
+        bases.append(transform(base.rotation[0, 0], base.origin[0, 0]))
+    return replace(model, bases=tuple(bases))
 
 
 def _tool_only(tracks: list[Track], model: Model) -> Model:
@@ -237,15 +241,6 @@ def in_turn(
     each = np.arange(len(best)), best
     frames = tuple(transform(base.rotation[each], base.origin[each]) for base in result)
     return frames, transform(turn, vectors[each])
-
-
-def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> tuple[Array, ...]:
-    """Return the base frames of known tools, each (T, 4, 4); see `in_turn`."""
-    turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
-    starts = [Bases(base[:, None, :3, :3], base[:, None, :3, 3]) for base in bases]
-    pairs = zip(tracks, starts, strict=True)
-    result = [_based(*pair, turn, vectors, REWEIGHTED) for pair in pairs]
-    return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in result)
 
 
 def _reached(track: Track, vectors: Array) -> Array:

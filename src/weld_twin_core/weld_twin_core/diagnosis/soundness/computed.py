@@ -46,7 +46,6 @@ def _mistake(recording: Recording, remaining: float) -> Finding:
         ('instrument',),
         "Record what an instrument measures (a tracker, a camera, contacts); a controller's own "
         'pose (tool0, tcp_pose) tells what it believes, not where the tool is',
-        of_all=False,
     )
 
 

@@ -30,8 +30,8 @@ class Finding(NamedTuple):
     What a check found: a 'note' or a 'warning' in a sentence for people, or a mistake.
 
     A mistake, level 'unsound', also has what `weld_twin_core.diagnosis.result.Unsound` tells.
-    ``mend`` undoes it, None where nothing can; ``of_all`` tells that other recordings of the cell
-    have it too; ``alike`` are kinds and places that would explain the data as well.
+    ``mend`` undoes it, None where nothing can; ``alike`` are kinds and places that would explain the
+    data as well.
     """
 
     level: str
@@ -40,7 +40,6 @@ class Finding(NamedTuple):
     at: tuple[str, ...] = ()
     remedy: str = ''
     mend: Mend | None = None
-    of_all: bool = True
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def as_unsound(self, *, applied: bool) -> Unsound:

@@ -28,7 +28,7 @@ from .efforts import efforts
 from .evidence import Case, Finding, mistake
 from .images import images
 from .limits import FEW, MOST
-from .mending import Given, as_entry
+from .mending import ONE, Given, as_entry
 from .mixups import mixups
 from .richness import motion, outliers, quantity, repeats
 from .rows import rows
@@ -132,10 +132,10 @@ class Examined:
         return replace(self, checks=(*told, *(c for c in self.checks if c.name != 'tools')))
 
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-        """Return other recordings of the same cell after the same corrections."""
+        """Return other recordings of the same cell after the corrections that are not of one alone."""
         out = Given(tuple(recordings), self.given.robot, self.given.align)
         for each in self.mistakes:
-            if each.mend is not None and each.of_all:
+            if each.mend is not None and ONE not in (as_entry(each.mend) or {}):
                 out = each.mend(out)
         return tuple(velocities_checked(recording) for recording in out.recordings)
 

@@ -238,7 +238,7 @@ MENDS: dict[str, Callable[..., Given]] = {
     'velocities': velocities_left_out,
 }
 """What diagnosis.json calls each correction."""
-_ONE = 'k'
+ONE = 'k'
 """What a correction of one recording alone calls its number."""
 
 
@@ -268,10 +268,10 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
         made = MENDS.get(own.pop('do', ''))
         if made is None:
             raise ModelError(f'no correction of data is known that is {entry!r}')
-        if _ONE in own:
-            if own[_ONE] != which or not given.recordings:
+        if ONE in own:
+            if own[ONE] != which or not given.recordings:
                 continue
-            own[_ONE] = 0
+            own[ONE] = 0
         try:
             given = made(given, **own)
         except (TypeError, ValueError, KeyError, IndexError, DataError) as error:

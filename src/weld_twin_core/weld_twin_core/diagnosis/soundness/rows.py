@@ -136,7 +136,6 @@ class _Stations(NamedTuple):
             ('instrument',),
             f'Put each reading beside the station where it was taken{done}',
             make if certain else None,
-            of_all=False,
         )
 
 

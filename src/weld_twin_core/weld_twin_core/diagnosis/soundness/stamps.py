@@ -55,7 +55,6 @@ def _velocities(recording: Recording, k: int, names: tuple[str, ...]) -> Iterato
             at,
             'Publish measured velocities, or leave the field empty',
             partial(velocities_left_out, k=k),
-            of_all=False,
         )
 
 
@@ -86,7 +85,6 @@ def _apart(recording: Recording, k: int) -> Iterator[Finding]:
         ('clock',),
         ONE_CLOCK,
         mend,
-        of_all=False,
     )
 
 
@@ -111,7 +109,6 @@ def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
         "Record the instrument's own time of each measurement, or send each at once; --apply "
         'stamps them anew',
         _stamped(even, k, t.size),
-        of_all=False,
     )
 
 
@@ -233,7 +230,7 @@ def _late_by(case: Case, lag: Lag, k: int) -> Iterator[Finding]:
     else:
         return
     if wrong:
-        yield mistake(sentence, 'clock', ('clock',), ONE_CLOCK, mend, of_all=False)
+        yield mistake(sentence, 'clock', ('clock',), ONE_CLOCK, mend)
     else:
         yield note(sentence)
 

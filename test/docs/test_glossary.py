@@ -55,13 +55,10 @@ def page(elbow_found):
     return (elbow_found / 'report.html').read_text(encoding='utf-8')
 
 
-def test_every_label_of_the_page_is_explained(page):
+def test_every_label_of_the_page_is_explained_and_alike_wherever_it_is(page):
     words = rows(GLOSSARY)
     left = {label: rest for label in labels(page) if (rest := unexplained(label, words))}
     assert left == {}
-
-
-def test_what_the_page_explains_itself_is_explained_alike(page):
     folded = re.search(r'What the words on this page mean.*?</dl>', page, flags=re.DOTALL)[0]
     terms = {unescape(term).lower() for term in re.findall(r'<dt[^>]*>([^<]+)</dt>', folded)}
     assert terms and terms <= rows(GLOSSARY)

@@ -92,16 +92,12 @@ def test_rooms_point_to_rooms_below_them(house, graph):
 
 
 @pytest.mark.parametrize('package', PACKAGES)
-def test_tests_of_a_package_import_it_and_those_below_alone(package):
+def test_tests_of_a_package_import_it_and_those_below_alone_and_have_names_of_their_own(package):
     allowed = set(PACKAGES[: PACKAGES.index(package) + 1])
     for file in sorted((ROOT / 'src' / package / 'test').rglob('*.py')):
         named = {name.split('.')[0] for name in imported_names(file.stem, file)}
         assert named & set(PACKAGES) <= allowed, file
-
-
-@pytest.mark.parametrize('package', PACKAGES)
-def test_tests_of_a_package_have_names_of_their_own(package):
-    """As colcon runs them, each is imported by its bare name."""
+    # As colcon runs them, each is imported by its bare name.
     names = [file.name for file in (ROOT / 'src' / package / 'test').rglob('*.py')]
     twice = {name for name in names if names.count(name) > 1}
     assert twice - {'conftest.py'} == set()

@@ -105,14 +105,11 @@ def left_by_the_wrong_one(robot, problem, model, there=SPRING, wrong=OFFSET):
     return float(np.sqrt(max(costs[0] - costs[1], 0.0)))
 
 
-def test_effects_of_speed_ask_stations_for_motion(ur5):
+def test_effects_of_speed_ask_stations_for_motion_and_creeping_for_time(ur5):
     late = {'effect': 'time_delay', 'delay': 5e-3}
     lag = {'effect': 'servo_lag', 'joint': 'shoulder_lift_joint', 'time_constant': 5e-3}
     found = proposed(ur5, *at_hand(ur5), late, lag)
     assert found['kind'] == 'path' and not found['motion']['static']
-
-
-def test_slow_creeping_against_nothing_asks_for_time(ur5):
     creep = {'effect': 'drift', 'xyz_rate': [2e-8, 0.0, 0.0]}
     found = proposed(ur5, *at_hand(ur5), creep, BASE)
     assert found['kind'] == 'warm_up'

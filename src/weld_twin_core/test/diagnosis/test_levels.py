@@ -79,13 +79,10 @@ def test_by_joint_says_what_the_causes_say(dented):
     assert dented.where.regimes['static'] > 0.8
 
 
-def test_its_curve_is_carried_and_shrinks_the_gap_of_another_motion(dented):
+def test_its_curve_has_the_shape_of_the_dent_and_shrinks_the_gap_of_another_motion(dented):
     assert {effect.name for effect in dented.model.found} == {'joint_curve'}
     assert dented.shrink.held_out == 'bent'
     assert dented.shrink.ratio < 0.6
-
-
-def test_the_curve_has_the_shape_of_the_dent(dented):
     (curve,) = [e for e in dented.model.found if e.channel == 'q']
     angle = np.linspace(1.1, 1.9, 50)
     shape = np.asarray(curve.values) @ basis(curve.knots, angle)

@@ -29,19 +29,13 @@ def test_every_station_makes_it_surer(plan):
     assert plan.elsewhere[-1] > plan.sigma[-1] > 3e-5, "a diagnosis counts noise as the arm's"
 
 
-def test_stations_are_all_different_and_clear_of_the_floor(plan):
+def test_stations_are_all_different_say_more_than_such_that_look_alike_and_pay_for_noise(plan):
     apart = np.linalg.norm(plan.q[:, None] - plan.q[None], axis=2) + 9.0 * np.eye(30)
     assert apart.min() > 0.1
     assert forward(ROBOT, plan.q)[:, 2, 3].min() > 0.1
     ROBOT.check_positions(plan.q)
-
-
-def test_noise_is_paid_for_in_proportion_once_all_is_known(plan):
     rough = plan_stations(ROBOT, 30, 2e-4, 3e-4)
     assert 3.0 < rough.sigma[-1] / plan.sigma[-1] <= 10.0
-
-
-def test_chosen_stations_say_more_than_stations_that_look_alike(plan):
     alike = plan_stations(ROBOT, 30, 2e-4, 3e-5, spread=np.radians(10.0))
     # Among postures that look alike little is open, for little of the arm is seen.
     assert alike.sigma[0] <= plan.sigma[0] + 1e-9

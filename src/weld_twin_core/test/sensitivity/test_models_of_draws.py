@@ -114,12 +114,9 @@ def test_fast_model_agrees_with_the_exact_twin_run_by_run(study, families):
     assert fast.error < 1e-3
 
 
-def test_effects_the_expansion_cannot_carry_are_run_exactly(study):
+def test_what_the_expansion_cannot_carry_or_is_too_wide_for_it_is_run_exactly(study):
     tolerances = default_tolerances(study.robot, ('transmission_ripple',))
     assert model(study, tolerances).expansion is None
-
-
-def test_tolerances_too_wide_for_the_expansion_are_run_exactly(study):
     wide = default_tolerances(study.robot, ('joint_offset', 'link_length'), 300.0)
     assert model(study, wide).expansion is None
 

@@ -164,16 +164,13 @@ def reasons(robot, places, at):
     return [item.why for item in found if 'place that was touched' in item.why]
 
 
-def test_beside_a_single_place_the_model_is_believed_and_far_from_it_not(robot):
+def test_the_model_is_believed_as_far_as_a_single_place_or_several_vouch(robot):
     assert reasons(robot, [[0.5, 0.1, 0.3]], [0.5, 0.15, 0.3]) == []
     (why,) = reasons(robot, [[0.5, 0.1, 0.3]], [0.5, 0.4, 0.3])
     assert why == (
         'the tool is 0.3 m from the nearest place that was touched, and the model was tested to '
         '0.1 m'
     )
-
-
-def test_three_places_vouch_as_far_as_from_each_to_the_next(robot):
     places = [[0.5, 0.1, 0.3], [0.5, -0.1, 0.3], [0.5, 0.1, 0.55]]
     assert reasons(robot, places, [0.5, -0.3, 0.3]) == []
     (why,) = reasons(robot, places, [0.5, -0.4, 0.3])

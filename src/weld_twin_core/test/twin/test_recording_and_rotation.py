@@ -167,13 +167,10 @@ def same(x, y, slopes, at, other):
     np.testing.assert_allclose(rate, other(at, 1), atol=1e-12)
 
 
-def test_pieces_with_given_slopes(knots):
+def test_curves_through_knots_are_those_of_scipy(knots):
     x, y, at = knots
     slopes = np.random.default_rng(3).normal(size=y.shape)
     same(x, y, slopes, at, CubicHermiteSpline(x, y, slopes, axis=0))
-
-
-def test_a_natural_spline_bends_without_a_jump(knots):
     x, y, at = knots
     same(x, y, natural_slopes(x, y), at, CubicSpline(x, y, bc_type='natural'))
 

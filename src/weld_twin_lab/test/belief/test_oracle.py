@@ -64,21 +64,15 @@ def seen(tried_once):
     return tried_once[:2]
 
 
-def test_small_errors_stand_at_every_joint(seen):
+def test_small_errors_stand_at_every_joint_and_are_there_until_they_are_taken_out(seen):
     case, _ = seen
     joints = set(case.cell.robot.joint_names)
     for kind in ('joint_offset', 'link_length', 'link_twist', 'transmission_ripple'):
         assert {joint for name, joint in map(site, case.causes) if name == kind} == joints
-
-
-def test_what_is_said_of_the_largest_kinds_is_there(seen):
     case, found = seen
     parts = there(case, found)
     assert len(parts) >= 3
     assert all(0.8 < part['name'] < 1.2 for part in parts[:3])
-
-
-def test_nothing_of_a_kind_is_there_once_it_is_taken_out_of_the_arm(seen):
     case, found = seen
     kind = found.causes[0].name[0][0].effect
     rest = [cause for cause in case.causes if cause['effect'] != kind]

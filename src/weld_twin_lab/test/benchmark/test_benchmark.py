@@ -182,11 +182,8 @@ def test_a_table_that_is_damaged_is_refused(tmp_path, capsys):
     assert 'is damaged' in capsys.readouterr().err
 
 
-def test_a_checkout_without_an_environment_is_refused(tmp_path):
+def test_a_job_or_an_environment_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(DataError, match='run make setup'):
         measured(tmp_path, tmp_path, 1, [], quiet)
-
-
-def test_a_job_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(DataError, match='no job is called tea'):
         measured(None, tmp_path, 1, ['tea'], quiet)

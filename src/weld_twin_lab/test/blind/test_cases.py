@@ -137,15 +137,12 @@ def test_an_aligned_base_hides_what_a_base_does():
     assert rms(bent - rigid(points, bent)) > 0.5 * rms(bent - bent.mean(axis=0))
 
 
-def test_the_floor_is_the_noise_and_outliers_are_set_apart(robot, taken):
+def test_the_floor_is_noise_and_jitter_and_outliers_are_set_apart(robot, taken):
     tracker = Tracker(rate=60.0, sigma=SIGMA, outlier_share=0.05, outlier_size=3e-3)
     cause = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}
     left, outliers = floor(BlindCell(robot, tracker), [cause], taken)
     np.testing.assert_allclose(left, np.sqrt(3.0) * SIGMA, rtol=0.1)
     assert 5 <= len(outliers) <= 40
-
-
-def test_jitter_is_part_of_the_floor(robot, taken):
     still, shaken = (
         floor(BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=jitter)), [], taken)[0]
         for jitter in (0.0, 1e-3)

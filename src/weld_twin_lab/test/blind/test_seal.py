@@ -106,11 +106,8 @@ def test_a_diagnosis_that_could_read_the_truths_is_refused(sealed, tmp_path, pla
     assert not (tmp_path / 'out').exists()
 
 
-def test_truths_elsewhere_are_out_of_reach(sealed):
+def test_truths_are_out_of_reach_of_others(sealed):
     assert seal.truths_within_reach(sealed[0]) is None
-
-
-def test_only_the_owner_can_read_the_truths(sealed):
     seal.make_private(sealed[1])
     for path in (sealed[1], *sealed[1].rglob('*')):
         assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0

@@ -50,20 +50,14 @@ def stamps(recording):
     return set(recording.measured.t)
 
 
-def test_there_are_twenty_of_an_arm(found):
+def test_of_twenty_splits_none_is_judged_on_what_it_was_fitted_on(found):
     assert len(found) == 20
-
-
-def test_nothing_is_judged_on_what_it_was_fitted_on(found):
     for split in found.values():
         fitted = stamps(split.train)
         assert len(fitted) >= LEAST
         assert not fitted & stamps(split.inside)
         if split.outside is not None:
             assert not (fitted | stamps(split.inside)) & stamps(split.outside)
-
-
-def test_a_table_has_its_own_rows_alone(found):
     for split in found.values():
         assert split.train.joints.q.shape[0] == split.train.measured.t.size
 

@@ -192,13 +192,10 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path, ur5, text, words):
     assert '\n' not in str(caught.value)
 
 
-def test_a_spreadsheet_is_no_table(tmp_path, ur5):
+def test_a_spreadsheet_and_a_missing_table_are_told(tmp_path, ur5):
     (tmp_path / 't.xlsx').write_bytes(b'PK\x03\x04\0\0\0\0')
     with pytest.raises(DataError, match='is no text; save it as CSV'):
         read_table(tmp_path / 't.xlsx', ur5)
-
-
-def test_a_missing_table_is_named(tmp_path, ur5):
     with pytest.raises(DataError, match=r"nowhere\.csv' cannot be read: No such file"):
         read_table(tmp_path / 'nowhere.csv', ur5)
 

@@ -215,12 +215,9 @@ def test_rows_in_which_an_instrument_saw_no_target_are_left_out(tmp_path):
     assert any('3 rows' in each and 'line 4' in each and 'zero' in each for each in said)
 
 
-def test_a_single_point_at_the_origin_of_the_instrument_is_kept(tmp_path):
+def test_a_single_point_or_a_pin_at_the_origin_is_kept(tmp_path):
     recording, _ = of(tmp_path, lines(PLAIN, rows(DEG, MM - MM[3])))
     np.testing.assert_allclose(recording.measured.position, SEEN - SEEN[3], atol=2e-6)
-
-
-def test_a_pin_at_the_origin_is_touched_again_and_again(tmp_path):
     recording, said = of(tmp_path, lines(PLAIN, rows(DEG, 0.0 * MM)))
     assert not recording.measured.position.any() and len(recording.joints.q) == len(Q), said
 

@@ -33,11 +33,8 @@ def test_the_share_of_independent_rows_is_that_of_an_autoregression(rho):
     assert share <= 1.0
 
 
-def test_a_residual_that_alternates_never_counts_more_than_its_rows():
+def test_rows_never_count_more_than_they_are_and_recordings_by_theirs():
     assert effective_share(wandering(-0.7, 5000, 3).ravel(), (3,), (5000,)) <= 1.0
-
-
-def test_recordings_count_by_their_rows():
     long, short = wandering(0.6, 40000, 3).ravel(), wandering(0.0, 20000, 3, seed=1).ravel()
     share = effective_share(np.concatenate([long, short]), (3, 3), (40000, 20000))
     assert share == pytest.approx((2.0 * 0.25 + 1.0) / 3.0, rel=0.08)

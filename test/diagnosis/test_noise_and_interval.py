@@ -172,18 +172,12 @@ def deviations(hang):
     return np.array(out)
 
 
-def test_in_white_noise_a_standard_error_is_one():
+def test_a_standard_error_is_one_in_white_noise_more_where_it_hangs_together_or_none():
     # the mean square of 60 normal numbers lies below 1.5 all but one time in a hundred; the
     # larger of two estimates of one variance makes it smaller
     assert 0.45 < np.mean(deviations(0.0) ** 2) < 1.5
-
-
-def test_noise_that_hangs_together_within_stretches_makes_errors_larger():
     # rows counted as independent would make this (1 + 0.8) / (1 - 0.8) = 9
     assert np.mean(deviations(0.8) ** 2) < 2.5
-
-
-def test_what_the_data_do_not_show_has_no_standard_error():
     true = effect('tool_pose', xyz=[1e-3, 0.0, 0.0], rotvec=[0.0, 0.0, 0.0])
     problem, model = tiny((true,), turned=False)
     _, (std,) = errors_told(problem, model.with_found((true,)))

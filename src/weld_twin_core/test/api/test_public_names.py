@@ -46,12 +46,9 @@ def test_importing_it_loads_no_array_library():
     assert done.stdout.strip() == '[]'
 
 
-def test_dir_lists_what_can_be_had():
+def test_dir_lists_what_can_be_had_and_a_name_that_does_not_exist_is_told():
     assert set(public()) <= set(dir(wt))
     assert [name for name in public() if not hasattr(wt, name)] == []
-
-
-def test_a_name_that_does_not_exist_is_told():
     with pytest.raises(AttributeError, match="no public name 'diagnoze'; dir"):
         wt.diagnoze  # noqa: B018
 

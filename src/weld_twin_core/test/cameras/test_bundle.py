@@ -115,15 +115,12 @@ def by_two(poses, shown):
     return Sightings(cameras, targets, np.arange(14.0), *numbers, np.transpose(pixel))
 
 
-def test_what_shares_a_stamp_is_found_beside_each_other_and_tells_the_other_stamps():
+def test_what_shares_a_stamp_tells_the_other_stamps_and_what_shares_none_is_named():
     poses = board_before_camera(np.random.default_rng(2))
     shown = {(0, 0): range(9), (1, 0): range(6, 12), (0, 1): range(7, 14)}
     found = adjusted(by_two(poses, shown)).measured
     np.testing.assert_allclose(found.position, poses[:, :3, 3], atol=1e-6)
     np.testing.assert_allclose(found.rotation, poses[:, :3, :3], atol=1e-6)
-
-
-def test_what_shares_no_stamp_is_named():
     poses = board_before_camera(np.random.default_rng(2))
     with pytest.raises(DataError, match=r"^camera 'right' is in no image of a stamp that shows"):
         adjusted(by_two(poses, {(0, 0): range(9), (1, 1): range(9, 14)}))

@@ -43,14 +43,11 @@ def taught(constant=0.0, **weights):
     )
 
 
-def test_log_odds_are_a_sum_over_features_and_end_where_nothing_was_learned():
+def test_log_odds_are_a_sum_over_features_and_nothing_where_nothing_was_learned():
     told = taught(0.5, gap=1.0, left=-2.0)
     for gap, left, total in ((1.0, 0.5, 0.5), (9.0, 0.0, 3.5), (-9.0, 0.0, -1.5)):
         probability = told.probability('name', {'gap': gap, 'left': left})
         assert probability == pytest.approx(1.0 / (1.0 + np.exp(-total)))
-
-
-def test_a_family_that_is_not_named_counts_as_nothing():
     told = taught(0.0, **{'only backlash': -1.0})
     assert told.probability('name', {}) == pytest.approx(0.5)
     assert told.probability('name', {'only backlash': 1.0}) == pytest.approx(1.0 / (1.0 + np.e))

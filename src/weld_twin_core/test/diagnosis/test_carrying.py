@@ -143,22 +143,15 @@ def parted(*candidate_set):
     return {r.site: r.probability for r in found.candidate_sets[0]}
 
 
-def test_an_alternative_that_fails_where_the_leader_holds_is_not_its_like():
+def test_an_alternative_is_its_like_as_long_as_it_carries_as_far_as_the_leader():
+    # It fails where the leader holds; it leaves five percent more; the leader fails, too; what looked
+    # likelier fails however sure it was.
     told = parted((TWIST, 0.6, 1e-4), (BASE, 0.2, 1.06e-4), (PLAY, 0.2, 1e-4))
     assert told == pytest.approx({TWIST: 0.75, PLAY: 0.25})
-
-
-def test_an_alternative_that_leaves_five_percent_more_is_still_alike():
     told = parted((TWIST, 0.6, 1e-4), (BASE, 0.4, 1.04e-4))
     assert told == {TWIST: 0.6, BASE: 0.4}
-
-
-def test_a_leader_that_fails_itself_rules_nothing_out():
     told = parted((TWIST, 0.6, 3e-4), (BASE, 0.4, 1e-4))
     assert told == {TWIST: 0.6, BASE: 0.4}
-
-
-def test_what_looked_likelier_here_and_fails_there_is_out_however_sure_it_was():
     told = parted((BASE, 0.9, 3e-4), (TWIST, 0.08, 1e-4), (PLAY, 0.02, 9e-4))
     assert told == pytest.approx({TWIST: 0.8, PLAY: 0.2})
 

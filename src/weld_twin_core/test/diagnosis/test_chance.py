@@ -112,19 +112,13 @@ def test_a_gain_counts_parts_and_not_samples():
     assert gain(np.repeat(before, 9), np.repeat(after, 9), np.repeat(labels, 9)) == told
 
 
-def test_where_other_samples_are_trusted_parts_are_still_compared_with_themselves():
+def test_parts_are_compared_with_themselves_and_one_left_out_gives_a_variance():
     before, after = np.array([2.0, 2.0, 8.0]), np.array([1.0, 4.0])
     told = gain(before, after, np.array([0, 0, 1]), np.array([0, 1]))
     assert told.steady == pytest.approx(np.mean([1.0, 4.0]) / (1.5 * np.sqrt(2.0) / np.sqrt(2.0)))
-
-
-def test_leaving_one_out_gives_the_variance_of_a_mean():
     values = np.array([1.0, 4.0, -2.0, 3.0, 0.5])
     tries = np.array([np.delete(values, k).mean() for k in range(values.size)])
     assert jackknife(tries) == pytest.approx(values.var(ddof=1) / values.size)
-
-
-def test_an_error_grows_by_what_it_does_and_falls_only_where_that_is_no_chance():
     before = np.array([1.0, 1.0, 4.0, 4.2, 1.0, 3.0, 9.0])
     after = np.array([4.0, 4.0, 1.0, 1.1, 3.0, 0.5, 16.0])
     parts = np.array([0, 0, 1, 1, 2, 2, 3])

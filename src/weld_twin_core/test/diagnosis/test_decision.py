@@ -267,17 +267,11 @@ def test_what_is_left_is_a_share_of_the_squared_gap_above_the_floor():
     assert Left(evidence(after=9.0, floor=2.0, gap=8.0), Beliefs()).share == 1.0
 
 
-def test_a_structure_that_does_not_count_leaves_nothing():
+def test_a_structure_is_a_share_of_what_there_is_to_share():
     chance = evidence(structure=left_over(0.1, 1.0), after=4.0, floor=3.5, gap=8.0)
     assert Left(chance, Beliefs()).share == 0.0
-
-
-def test_a_gap_within_the_floor_counts_as_a_twentieth_of_it():
     told = evidence(structure=left_over(0.1), after=0.4, floor=2.0, gap=2.0)
     assert Left(told, Beliefs()).share == pytest.approx(0.1 * 0.16 / (0.05 * 4.0))
-
-
-def test_without_gap_and_floor_a_nanometre_is_divided_by():
     told = evidence(after=0.5e-9, floor=0.0, gap=0.0, independent=False)
     found = replace(told, structure=left_over(0.2), independent=True)
     assert Left(found, Beliefs()).share == pytest.approx(0.25)

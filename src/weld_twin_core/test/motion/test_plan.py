@@ -192,14 +192,11 @@ def test_samples_are_even_and_end_at_the_end(name, length):
     assert timing.s.max() <= length * (1 + 1e-12)
 
 
-def test_a_trapezoid_takes_the_hand_time():
+def test_a_trapezoid_takes_the_hand_time_and_a_short_one_never_cruises():
     # 0.1 s up, 0.4 m at 1 m/s, 0.1 s down.
     law = Trapezoid(1.0, 10.0).law(0.5)
     assert law.x[-1] == pytest.approx(0.6)
     assert law(0.1) == pytest.approx(0.05)
-
-
-def test_a_short_trapezoid_never_cruises():
     # Triangle: peak sqrt(a L) = 0.1 m/s, 2 x 0.1 s.
     law = Trapezoid(1.0, 1.0).law(0.01)
     assert law.x[-1] == pytest.approx(0.2)

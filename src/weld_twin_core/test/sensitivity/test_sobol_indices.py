@@ -91,12 +91,9 @@ def test_results_that_are_not_numbers_are_counted_and_refused():
         morris.screening(bad)
 
 
-def test_a_result_without_scatter_is_refused():
+def test_results_without_scatter_and_counts_that_are_no_power_of_two_are_refused():
     with pytest.raises(DataError, match='no scatter'):
         sobol_indices(lambda u: np.ones(len(u)), 'ab', 64)
-
-
-def test_sample_count_that_is_no_power_of_two_is_refused():
     with pytest.raises(DataError, match='power of two'):
         SobolDesign(('a', 'b'), 1000)
 

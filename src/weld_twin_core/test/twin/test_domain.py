@@ -43,13 +43,10 @@ def test_a_joint_beyond_its_range_is_told_by_name_and_distance():
     assert np.abs(swinging(1.46)[truly & ~flagged, 3]).max() < 0.525
 
 
-def test_the_same_motion_again_lies_inside():
+def test_a_motion_is_inside_again_and_so_is_a_full_turn_but_no_hole():
     domain = Domain.of([recorded(swinging(0.5))], UR5)
     again = recorded(swinging(0.5))
     assert domain.outside(again.joints.q, again.joints.velocity) == []
-
-
-def test_a_hole_in_the_range_is_outside_and_a_full_turn_is_not():
     q = np.concatenate([swinging(0.1)[:200] * 0.1 - 1.0, swinging(0.1)[:200] * 0.1 + 1.0])
     domain = Domain.of([recorded(q)], UR5)
     away = domain.beyond(np.array([np.zeros(6), np.full(6, 1.0 + 2.0 * np.pi)]))

@@ -72,19 +72,13 @@ def test_every_cause_that_can_be_drawn_is_known_to_the_plant_and_has_a_size(robo
             np.testing.assert_allclose(scaled(cause, 3.0)[key], 3.0 * np.asarray(cause[key]))
 
 
-def test_forty_cases_hold_every_kind_in_its_share():
+def test_cases_hold_every_kind_in_its_share_every_family_once_and_more_extend_the_list():
     drawn = lots(5, 40, constructions=tuple(CONSTRUCTIONS))
     assert Counter(lot.kind for lot in drawn) == KINDS
     assert len({lot.robot for lot in drawn}) >= 4
     assert {lot.motion for lot in drawn} == {'seams', 'free', 'stations'}
-
-
-def test_every_family_comes_once_before_any_comes_twice():
     drawn = lots(5, len(FAMILIES), kinds=('withheld',))
     assert sorted(lot.families[0] for lot in drawn) == sorted(FAMILIES)
-
-
-def test_more_cases_extend_the_same_list_and_another_seed_is_another():
     assert lots(5, 60)[:20] == lots(5, 20)
     assert lots(6, 20) != lots(5, 20)
 

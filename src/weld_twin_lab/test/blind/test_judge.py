@@ -183,11 +183,8 @@ def test_a_bootstrap_interval_has_the_width_of_theory():
     assert high - low == pytest.approx(2 * 1.96 * values.std() / 20.0, rel=0.08)
 
 
-def test_brier_score_by_hand():
+def test_brier_score_and_calibration_error_by_hand():
     assert brier([0.9, 0.6], [True, False]).value == pytest.approx((0.01 + 0.36) / 2)
-
-
-def test_calibration_error_by_hand():
     # 0.9-1.0: two cases of mean confidence 0.95, half right; 0.5-0.6: one case, right.
     error = calibration_error([0.95, 0.95, 0.5], [True, False, True])
     assert error.value == pytest.approx((2 * 0.45 + 1 * 0.5) / 3)

@@ -133,23 +133,17 @@ def test_each_moves_the_tool_a_little(effect, static):
     assert 1e-5 < np.sqrt(np.mean(gap**2)) < 3e-3
 
 
-def test_station_step_is_a_step():
+def test_a_step_a_scale_and_a_sticking_joint_are_as_told():
     command = weave(UR5, 6.0)
     step = {'effect': 'station_step', **CASES['station_step']}
     gap = record(UR5, [step], command).position - dh_positions(UR5, command.q)
     assert np.allclose(gap[command.t < 3.0], 0.0, atol=1e-9)
     assert np.allclose(gap[command.t >= 3.0], [1e-3, 0.0, 0.0], atol=1e-9)
-
-
-def test_quadratic_scale():
     command = stations(UR5, 5)
     got = record(UR5, [{'effect': 'quadratic_scale', 'coefficient': 1e-4}], command)
     p = dh_positions(UR5, command.q)
     stretched = p * (1.0 + 1e-4 * np.linalg.norm(p, axis=1, keepdims=True))
     assert np.allclose(got.position, stretched, atol=1e-12)
-
-
-def test_stick_slip_stays_within_its_amplitude():
     moved = joint_displacement(
         UR5, [{'effect': 'stick_slip', **CASES['stick_slip']}], weave(UR5, 6.0), 'j2'
     )

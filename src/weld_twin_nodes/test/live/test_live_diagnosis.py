@@ -63,14 +63,11 @@ def recording():
     return filled(seconds=6.0).recording(least=3.0)
 
 
-def test_the_window_holds_its_duration_and_no_more():
+def test_the_window_holds_its_duration_and_without_stamps_a_number():
     recording = filled(duration=4.0).recording(least=3.0)
     assert recording.joints.t[-1] - recording.joints.t[0] == pytest.approx(4.0, abs=0.03)
     assert recording.measured.t.size == recording.joints.t.size == pytest.approx(201, abs=1)
     assert recording.epoch_ns + round(recording.joints.t[-1] * 1e9) == START + 11_980_000_000
-
-
-def test_a_stream_without_stamps_moving_on_is_bounded_by_number():
     window, make = Window(ONE_JOINT, 1e6), bag_messages()
     for k in range(1, LONGEST + 100):
         window.take(Role.JOINTS, make.joint_state(k, ('a',), np.zeros(1)))

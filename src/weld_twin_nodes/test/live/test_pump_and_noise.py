@@ -46,15 +46,12 @@ def test_every_sample_is_sent_once():
     assert sent == list(range(100))
 
 
-def test_noise_one_sample_at_a_time_is_the_noise_in_bulk():
+def test_noise_one_sample_at_a_time_is_that_in_bulk_with_the_spread_it_is_told():
     effects = [MeasurementNoise(1e-5), MeasurementNoise(3e-5)]
     bulk = Noise(effects, 5).draw(40)
     live = Noise(effects, 5)
     np.testing.assert_array_equal(np.vstack([live.draw(1) for _ in range(40)]), bulk)
     assert not np.array_equal(Noise(effects, 6).draw(40), bulk)
-
-
-def test_noise_has_the_spread_it_is_told():
     drawn = Noise([MeasurementNoise(3e-5), MeasurementNoise(4e-5)], 0).draw(20_000)
     np.testing.assert_allclose(drawn.std(axis=0), 5e-5, rtol=0.03)
     np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=2e-6)

@@ -50,7 +50,7 @@ ROBOTS = {'standard': UR5, 'modified': PANDA_ON_TRACK}
 EXACT = Tracker()
 
 
-def _about(axis: int, angle: float) -> np.ndarray:
+def _about(axis, angle):
     turn, (i, j) = np.eye(4), ((1, 2), (2, 0), (0, 1))[axis]
     turn[i, i] = turn[j, j] = np.cos(angle)
     turn[j, i] = np.sin(angle)
@@ -58,13 +58,13 @@ def _about(axis: int, angle: float) -> np.ndarray:
     return turn
 
 
-def _along(axis: int, length: float) -> np.ndarray:
+def _along(axis, length):
     shift = np.eye(4)
     shift[axis, 3] = length
     return shift
 
 
-def _pose(entry: dict | None) -> np.ndarray:
+def _pose(entry):
     entry = entry or {}
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(entry.get('quat_xyzw', [0, 0, 0, 1])).as_matrix()
@@ -72,7 +72,7 @@ def _pose(entry: dict | None) -> np.ndarray:
     return pose
 
 
-def dh_links(robot: dict, q: np.ndarray, built: dict | None = None) -> list[np.ndarray]:
+def dh_links(robot, q, built=None):
     """Return the links in the base frame, by 4 x 4 products; built: {joint: {key: error}}."""
     at, out = np.eye(4), []
     for joint, value in zip(robot['joints'], q, strict=True):
@@ -90,17 +90,17 @@ def dh_links(robot: dict, q: np.ndarray, built: dict | None = None) -> list[np.n
     return out
 
 
-def dh_pose(robot: dict, q: np.ndarray, built: dict | None = None) -> np.ndarray:
+def dh_pose(robot, q, built=None):
     """Return the tool in the world, a 4 x 4 matrix."""
     return _pose(robot.get('base')) @ dh_links(robot, q, built)[-1] @ _pose(robot.get('tool'))
 
 
-def dh_positions(robot: dict, q: np.ndarray, built: dict | None = None) -> np.ndarray:
+def dh_positions(robot, q, built=None):
     """Return tool positions in the world, shape (N, 3) [m]."""
     return np.array([dh_pose(robot, row, built)[:3, 3] for row in q])
 
 
-def potential(robot: dict, q: np.ndarray, payload: tuple | None = None) -> float:
+def potential(robot, q, payload=None):
     """Return the potential energy of links and payload in the base frame [J]."""
     g = np.array(robot.get('gravity', [0.0, 0.0, -9.80665]))
     frames, energy = dh_links(robot, q), 0.0
@@ -113,7 +113,7 @@ def potential(robot: dict, q: np.ndarray, payload: tuple | None = None) -> float
     return energy
 
 
-def gravity_torque(robot: dict, q: np.ndarray, payload: tuple | None = None) -> np.ndarray:
+def gravity_torque(robot, q, payload=None):
     """Return the torque with which gravity turns each joint, -dV/dq, shape (n,) [N m]."""
     step, out = 1e-5, np.zeros(len(q))
     for i in range(len(q)):
@@ -124,20 +124,13 @@ def gravity_torque(robot: dict, q: np.ndarray, payload: tuple | None = None) -> 
     return out
 
 
-def stations(robot: dict, count: int, seed: int = 0, **rest) -> Command:
+def stations(robot, count, seed=0, **rest):
     """Return scattered poses at rest."""
     q = np.random.default_rng(seed).uniform(-1.2, 1.2, (count, len(robot['joints'])))
     return Command(10.0 * np.arange(count) + 100.0, q, static=True, **rest)
 
 
-def weave(
-    robot: dict,
-    duration: float = 20.0,
-    rate: float = 125.0,
-    frequency: float = 0.15,
-    reach: float = 0.5,
-    **rest,
-) -> Command:
+def weave(robot, duration=20.0, rate=125.0, frequency=0.15, reach=0.5, **rest):
     """Return a smooth motion that starts at rest and reverses every joint."""
     t = np.arange(0.0, duration, 1.0 / rate)
     rise = np.clip(t, 0.0, 1.0)
@@ -149,21 +142,12 @@ def weave(
     return Command(t, q, **rest)
 
 
-def record(
-    robot: dict,
-    effects: list,
-    command: Command,
-    tracker: Tracker = EXACT,
-    seed: int = 0,
-    richness: float = 1.0,
-):
+def record(robot, effects, command, tracker=EXACT, seed=0, richness=1.0):
     """Run the plant with a seed."""
     return run(robot, effects, command, tracker, np.random.default_rng(seed), richness)
 
 
-def joint_displacement(
-    robot: dict, effects: list, command: Command, name: str, richness: float = 1.0
-) -> np.ndarray:
+def joint_displacement(robot, effects, command, name, richness=1.0):
     """Return how far one joint is from the command [rad], from the tool's position alone."""
     got = record(robot, effects, command, richness=richness).position
     clean = record(robot, [], command).position

@@ -171,7 +171,6 @@ def test_curves_through_knots_are_those_of_scipy(knots):
     x, y, at = knots
     slopes = np.random.default_rng(3).normal(size=y.shape)
     same(x, y, slopes, at, CubicHermiteSpline(x, y, slopes, axis=0))
-    x, y, at = knots
     same(x, y, natural_slopes(x, y), at, CubicSpline(x, y, bc_type='natural'))
 
 

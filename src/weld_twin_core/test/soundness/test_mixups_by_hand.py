@@ -34,8 +34,6 @@ from weld_twin_core.effects import JointCompliance, JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
 from weld_twin_core.effects.geometry import LinkLength, LinkOffset, LinkTwist, ToolPose
 
-ELBOW_TURNED = [1, 1, -1, 1, 1, 1]
-
 
 @pytest.fixture
 def still(ur5, rng):

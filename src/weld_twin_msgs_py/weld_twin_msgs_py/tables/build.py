@@ -164,12 +164,7 @@ def read_table(path: Path | str, robot: Robot, options: TableOptions | None = No
     """
     options = options or TableOptions()
     cells = read_cells(path, options.delimiter, options.decimal, options.marker)
-    return table_of(cells, robot, options, list(cells.said))
-
-
-def table_of(cells: Cells, robot: Robot, options: TableOptions, said: list[str]) -> Table:
-    """Return what the cells of a table mean; the same errors as `read_table`."""
-    return table_and_units(cells, robot, options, said)[0]
+    return table_and_units(cells, robot, options, list(cells.said))[0]
 
 
 def table_and_units(

@@ -13,7 +13,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
-from .build import BEYOND, LAST_STAMP, Table, own_epoch, table_and_units, table_of
+from .build import BEYOND, LAST_STAMP, Table, own_epoch, table_and_units
 from .cells import Cells, number, read_cells
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import JointColumns
@@ -60,7 +60,7 @@ def read_two_tables(
     times, own = _stamps(stream, options, result), _stamps(points, options, result)
     if times is None or own is None or not _stream(times):
         paired = _paired(log, seen, names, options, said)
-        return table_of(paired, robot, replace(options, time_column=None), said)
+        return table_and_units(paired, robot, replace(options, time_column=None), said)[0]
     said += result
     dated = bool(min(times[0], own[0]) > SINCE_1970)
     if dated and max(times[-1], own[-1]) >= LAST_STAMP:

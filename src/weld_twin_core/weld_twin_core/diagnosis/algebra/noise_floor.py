@@ -24,6 +24,12 @@ have 0.01 to 0.1 mm, optical ones and good cameras 0.1 to 0.35 mm. Noise that is
 itself, in repeats or differences, or be given with the data: a misfit looks the same."""
 
 
+SPREAD_ERROR = 1.17
+"""Standard error of a spread by the median of sizes, times the root of how many there are, over it."""
+SURELY = 3.0
+"""Standard errors by which what is left has to be below a noise that was given or seen to replace it."""
+
+
 class NoiseFloor(NamedTuple):
     sigma: float  # standard deviation of one measured coordinate, [m]
     independent: bool  # whether it was given, or seen in repeats or differences
@@ -55,7 +61,11 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
             independent &= direct is not None
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3))
-        sigma = min(remaining, WIDEST) if direct is None else min(direct, remaining)
+        if direct is None:
+            sigma = min(remaining, WIDEST)
+        else:
+            by_chance = 1.0 - SURELY * SPREAD_ERROR / np.sqrt(max(position.size, 1))
+            sigma = remaining if remaining < by_chance * direct else direct
         estimates.append((share * sigma, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)

@@ -352,10 +352,11 @@ class Problem:
         The numbers are the same whichever recording was given first. Recordings count by their
         length; a stretch never spans two recordings. Where each has a base of its own, block k is
         the k-th part of every one: left out whole, a short recording would lose its base. Of
-        contacts each place is a stretch, where there are at least `PLACES`.
+        contacts each place is a stretch, where there are at least `PLACES`. Visits of one station lie
+        in the stretch of the first: what a station has by itself would be known from its other visits.
         """
         if self.own_bases:
-            parts = [(np.arange(m) * blocks) // max(m, 1) for m in self.samples]
+            parts = [self._stretches(k, blocks) for k in range(len(self.samples))]
             return np.concatenate([np.repeat(p, c) for p, c in zip(parts, self.rows, strict=True)])
         whole = self.places >= PLACES
         total = max(sum(self.samples), 1)
@@ -367,10 +368,19 @@ class Problem:
             count = max(1, round(blocks * m / total))
             if whole and self.contact(k) is not None:
                 count = 1
-            labels = start + (np.arange(m) * count) // max(m, 1)
-            out[k] = np.repeat(labels, c)
+            out[k] = np.repeat(start + self._stretches(k, count), c)
             start += count
         return np.concatenate(out)
+
+    def _stretches(self, k: int, count: int) -> NDArray[np.intp]:
+        """Return in which of some stretches every sample of a recording is, (M,)."""
+        m, station = self.samples[k], self.stations[k]
+        at = np.arange(m)
+        if station is not None:
+            _, first, which = np.unique(station, return_index=True, return_inverse=True)
+            if first.size >= 2 * count:
+                m, at = first.size, first.argsort().argsort()[which]
+        return at * count // max(m, 1)
 
     def thinned(self, most_rows: int) -> Problem:
         """

@@ -68,7 +68,7 @@ def answer(
     placing: what tells place and dependence of an unknown gap.
     limits: what the next experiment may cost, and where it has to stay; None plans none.
     """
-    forms = alternative, evidence.floor, result.work.beliefs, placing
+    forms = alternative, Left(evidence, result.work.beliefs), placing
     claims, shares = causes(result, unseen, before.table, verdict, *forms)
     groups = of_form(len(placing.parts), placing.steady)
     verdict, claims, statements = calibrated(verdict, claims, before, groups)

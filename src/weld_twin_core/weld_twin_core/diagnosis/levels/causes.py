@@ -22,7 +22,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.negligible import EMPTY
 from ..beliefs import Beliefs
-from ..evidence import Row, Search, Verdict, marginal
+from ..evidence import Left, Row, Search, Verdict, marginal
 from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import COVERED, jackknife, student
 from ..unseen.unseen_stretches import Unseen
@@ -43,15 +43,14 @@ def causes(
     table: Sequence[Row],
     verdict: Verdict,
     alternative: Curved | None,
-    floor: float,
-    beliefs: Beliefs,
+    left: Left,
     placing: FreeForm,
 ) -> tuple[tuple[Cause, ...], Shares]:
     """
     Return the causes, largest share first, and what of the squared gap is left and is noise.
 
     alternative: the free-form explanation; it is the model itself where ``unseen`` is its own.
-    floor: RMS of the noise alone [m].
+    left: what remains unseen, beside the noise.
     placing: what tells the places of an unknown gap; of any other nothing.
     """
     named = _claims_of_names(result, table, verdict)
@@ -67,14 +66,18 @@ def causes(
         whole = np.where(np.isnan(given), whole, given)
     else:
         whole, spread = _as_placed(whole, spread, given, placing)
-    noise = min(floor**2 / max(float(squares[0].mean()), EMPTY), 1.0 - float(whole.sum()))
-    remaining = max(1.0 - float(whole.sum()) - noise, 0.0)
+    beside = 1.0 - float(whole.sum())
+    noise = min(left.evidence.floor**2 / max(float(squares[0].mean()), EMPTY), beside)
+    if not (left.above_noise or left.wide or len(named) < len(result.candidate_sets)):
+        # Few rows leave more of noise alone on unseen parts than its floor.
+        noise = beside
+    remaining = max(beside - noise, 0.0)
     out = [
         _sized(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     # Of what nothing is known, neither a place nor what stands beside it, there is nothing to tell.
-    much = remaining > beliefs.unexplained and bool(out)
+    much = remaining > left.beliefs.unexplained and bool(out)
     if much or (rest.place and not out):
         error = float(np.sqrt((spread**2).sum()))
         out.append(replace(_sized(rest, remaining, error), rest=True))

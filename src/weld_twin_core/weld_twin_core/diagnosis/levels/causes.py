@@ -175,8 +175,10 @@ def _nameless(
         stand_in = _cause(beside, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
         return ([*claims, stand_in], _rest([])) if beside else (claims, stand_in)
     by_curves = {at for members in curves_at.values() for at in members}
-    for k, effect in enumerate(model if curved is not None else ()):
+    for k, effect in enumerate(model):
         if k in taken | by_curves or effect.traits.bends:
+            continue
+        if curved is None and not effect.traits.of_setup:
             continue
         if not effect.traits.cause and curves_at.get(effect.at):
             # How a set-up moved is nuisance, and no name beside the curves of that place.

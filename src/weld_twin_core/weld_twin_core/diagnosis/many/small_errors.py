@@ -56,16 +56,18 @@ def many_small(
     progress: Callable[[str], None],
 ) -> tuple[Fit, Scale, Array]:
     """Return the fit of all families together, its noise and its prior precision."""
-    everything = model.with_found(_everything(problem, model, exclude, beliefs))
+    found, everything = (
+        model.found,
+        model.with_found(_everything(problem, model, exclude, beliefs)),
+    )
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale, beliefs)
     model = model.with_found(tuple(effect.fit.turned() for effect in model.found))
     progress('families fitted together')
     model = with_lines(problem, model, scale, beliefs)
     progress('lines of high order looked for')
-    if 'base' in problem.align:
-        model = with_setup(problem, model, scale, beliefs)
-        progress('motion of the set-up looked for')
+    model = with_time(problem, model, found, exclude, scale, beliefs)
+    progress('motion of the set-up looked for')
     model, scale = shrunk_step(problem, model, scale, beliefs)
     result, precision = shrunk_fit(problem, model, scale, beliefs)
     return result, scale, precision
@@ -148,28 +150,60 @@ def _bends(
     return [effect for effect in out if effect is not None]
 
 
-def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
+def with_time(
+    problem: Problem,
+    model: Model,
+    found: Sequence[Effect],
+    exclude: Sequence[str],
+    scale: Scale,
+    beliefs: Beliefs,
+) -> Model:
     """
-    Return the model with the set-up's own creep and step in time, where they show.
+    Return the model with what goes with time, the worthiest first, where it shows beside all the rest.
 
-    Both are nuisance: they are part of where the frames were, not of the robot.
+    That is an error of the robot or of the instrument, as the search has found it if it has, or the
+    set-up's own creep and step: these are nuisance, part of where the frames were.
     """
-    for kind in [
-        kind for kind in REGISTRY.values() if kind.traits.of_setup and not kind.traits.dated
-    ]:
-        features = problem.features(model)
-        span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
-        residual = outside(problem.whitened(problem.residuals(model), scale), span)
-        least, best = beliefs.setup_chi2, None
-        for seed in features[moved_most(features, None)].seeds(kind, None)[0]:
-            own = outside(problem.whitened(problem.effect_columns(features, seed), scale), span)
-            size = np.linalg.lstsq(own.T, residual, rcond=None)[0]
-            chi = float(residual @ (size @ own))
-            if chi > least:
-                least, best = chi, seed.from_atoms(size)
-        if best is not None:
-            model = model.with_found((*model.found, best))
+    features, waiting = problem.features(model), list[Sequence[Effect]]()
+    have = {(effect.name, effect.site) for effect in model.found}
+    setup = [k for k in REGISTRY.values() if k.traits.of_setup and 'base' in problem.align]
+    for kind in (*candidate_kinds(problem.align), *setup):
+        traits = kind.traits
+        if traits.depends_on != 'time' or traits.dated or kind.name in exclude:
+            continue
+        for joint in joints_of(kind, model.robot):
+            if (kind.name, joint) in have or lacking(features, kind, joint) is not None:
+                continue
+            seeds = features[moved_most(features, joint)].seeds(kind, joint)[0]
+            own = [e for e in found if (e.name, e.site) == (kind.name, joint)]
+            if tried := own or [seed for seed in seeds if not hardly_moves(features, seed)]:
+                waiting.append(tried)
+    while waiting:
+        best = [_best_of(problem, model, seeds, scale) for seeds in waiting]
+        # A turn of the base may be one number of a joint: each number has its price (Schwarz).
+        worth = [chi - count * np.log(problem.size) for chi, count, _ in best]
+        k = int(np.argmax(worth))
+        chi, _, effect = best[k]
+        if chi <= beliefs.setup_chi2:
+            break
+        model = model.with_found((*model.found, effect))
+        del waiting[k]
     return model
+
+
+def _best_of(
+    problem: Problem, model: Model, seeds: Sequence[Effect], scale: Scale
+) -> tuple[float, int, Effect]:
+    """Return what the best of some seeds takes off chi-square, its numbers, and that one itself."""
+    features = problem.features(model)
+    span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
+    residual = outside(problem.whitened(problem.residuals(model), scale), span)
+    tried = list[tuple[float, int, Effect]]()
+    for seed in seeds:
+        own = outside(problem.whitened(problem.effect_columns(features, seed), scale), span)
+        size = np.linalg.lstsq(own.T, residual, rcond=None)[0]
+        tried.append((float(residual @ (size @ own)), size.size, seed.from_atoms(size)))
+    return max(tried, key=lambda one: one[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -316,7 +316,7 @@ def axis_compliance(cell):
     cell.table = {('alpha', row): x, ('beta', row): y}
 
 
-@defines(sag=SAG)
+@defines(sag=SAG, turning=[0.5, -1.0, 2.0])
 def tool_sag(cell):
     turn = np.eye(3)
     for row in cell.textbook.rows(cell.robot, cell.q)[cell.robot.behind :]:
@@ -326,7 +326,8 @@ def tool_sag(cell):
     # The least turn about the flange that takes the tip along; its axes are the tool's.
     sag = SAG.reshape(3, 3) @ down
     least = np.linalg.pinv([np.cross(axis, tool[:3, 3]) for axis in tool[:3, :3].T]).T @ sag
-    cell.tool = cell.textbook.frame(tool, sag, least, 'right')
+    more = tool[:3, :3].T @ np.cross([0.5, -1.0, 2.0], sag)
+    cell.tool = cell.textbook.frame(tool, sag, least + more, 'right')
 
 
 @defines(force=[10.0, -20.0, 30.0], stiffness=40.0)

@@ -33,7 +33,8 @@ that is no sag. Masses of the arm play no part.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -375,17 +376,23 @@ _SHORT = 1e-2
 
 
 @register
-class ToolSag(LinearEffect):
-    """The tip goes along the flange's axes by ``sag``, row by row, times how far down each points."""
+class ToolSag(Effect):
+    """
+    The tip goes along the flange's axes by ``sag``, row by row, times how far down each points.
+
+    With it the tool turns, as if about the flange; ``turning`` says by how much more for each metre
+    about the flange's axes, as a bracket gives way where it is weakest.
+    """
 
     sag: Value = (0.0,) * 9
+    turning: Value = (0.0,) * 3
 
     traits = Traits(
         title='sagging tool',
         meaning='the tool or its bracket bends under its own weight',
         formula='tool centre point → tool centre point + S down, S the nine numbers of `sag`, row by '
-        'row, down the direction of gravity in the flange; the tool turns about the flange by the '
-        'least that takes it there',
+        'row, down the direction of gravity in the flange; the tool turns about the axes of the flange '
+        'by the cross product of r / r² + turning and S down, r from the flange to the tool point',
         apart={
             'joint_compliance': 'put a dial gauge between flange and tool tip while the wrist turns'
         },
@@ -400,23 +407,41 @@ class ToolSag(LinearEffect):
         Parameter('sag', 'm', size=9, typical=1e-4).plausible(
             (1e-4, 3e-3), 'derived: a bracket that a torch of 3 kg bends by 3 mm is broken'
         ),
+        Parameter('turning', '1/m', size=3, typical=3.0, linear=False).plausible(
+            (5.0, 50.0), 'derived: no bracket gives way closer to the tip than two centimetres'
+        ),
     )
 
-    def per_unit(self, view: View) -> list[Shift]:
-        """Return the way along each axis and the turn with it, by how far down each of them points."""
-        down, tool = _down(view), view.robot.T_flange_tool
-        lever = tool[:3, 3]
-        length = float(np.linalg.norm(lever))
-        turns = np.zeros((3, 3))
-        if length > _SHORT:
-            # Rows: the turn about the tool's own axes for a way along each axis of the flange.
-            turns = np.cross(lever, np.eye(3)) @ tool[:3, :3] / length**2
-        return [
-            {('tool', way): down[..., k]}
-            | {('tool', 3 + about): by * down[..., k] for about, by in enumerate(turns[way])}
-            for way in range(3)
-            for k in range(3)
-        ]
+    def displace(self, view: View) -> Shift:
+        """Return the way of the tip along each axis of the flange, and the turn with it."""
+        ways = self._ways(view)
+        along: Shift = {('tool', way): own for way, own in enumerate(ways)}
+        return along | _turn_of(view, ways, self._turning(view))
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        down, about = _down(view), self._turning(view)
+        still = np.zeros(down.shape[:-1])
+        out: list[Shift | None] = []
+        for way in range(3):
+            for k in range(3):
+                ways = [down[..., k] if axis == way else still for axis in range(3)]
+                out.append({('tool', way): ways[way]} | _turn_of(view, ways, about))
+        ways = self._ways(view)
+        return [*out, *(_turn_of(view, ways, axis) for axis in np.eye(3))]
+
+    def atoms(self, view: View) -> list[Shift]:
+        return [shift for shift in self.gradient(view)[:9] if shift is not None]
+
+    def _ways(self, view: View) -> list[Array]:
+        down = _down(view)
+        each = [[self.number('sag', 3 * way + k) for k in range(3)] for way in range(3)]
+        return [x * down[..., 0] + y * down[..., 1] + z * down[..., 2] for x, y, z in each]
+
+    def _turning(self, view: View) -> list[Any]:
+        lever = view.robot.T_flange_tool[:3, 3]
+        square = float(lever @ lever)
+        own = lever / square if square > _SHORT**2 else np.zeros(3)
+        return [own[k] + self.number('turning', k) for k in range(3)]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
@@ -436,6 +461,17 @@ class ToolSag(LinearEffect):
             'Stiffen the bracket of the tool, and see what its cable hangs on: the tip sags by up to '
             f'{number(most * 1e3)} mm as the wrist turns it.'
         )
+
+
+def _turn_of(view: View, ways: Sequence[Array], about: Sequence[Any]) -> Shift:
+    """Return the turn about the tool's axes that goes with ways of its tip along the flange's."""
+    (x, y, z), (a, b, c) = ways, about
+    turn = (b * z - c * y, c * x - a * z, a * y - b * x)
+    axes = view.robot.T_flange_tool[:3, :3]
+    return {
+        ('tool', 3 + k): axes[0, k] * turn[0] + axes[1, k] * turn[1] + axes[2, k] * turn[2]
+        for k in range(3)
+    }
 
 
 def _down(view: View) -> Array:

@@ -415,8 +415,8 @@ class ToolSag(Effect):
     def displace(self, view: View) -> Shift:
         """Return the way of the tip along each axis of the flange, and the turn with it."""
         ways = self._ways(view)
-        along: Shift = {('tool', way): own for way, own in enumerate(ways)}
-        return along | _turn_of(view, ways, self._turning(view))
+        along: dict[Channel, Array] = {('tool', way): own for way, own in enumerate(ways)}
+        return {**along, **_turn_of(view, ways, self._turning(view))}
 
     def gradient(self, view: View) -> list[Shift | None]:
         down, about = _down(view), self._turning(view)
@@ -425,9 +425,10 @@ class ToolSag(Effect):
         for way in range(3):
             for k in range(3):
                 ways = [down[..., k] if axis == way else still for axis in range(3)]
-                out.append({('tool', way): ways[way]} | _turn_of(view, ways, about))
+                own: dict[Channel, Array] = {('tool', way): ways[way]}
+                out.append({**own, **_turn_of(view, ways, about)})
         ways = self._ways(view)
-        return [*out, *(_turn_of(view, ways, axis) for axis in np.eye(3))]
+        return [*out, *(_turn_of(view, ways, axis) for axis in np.eye(3).tolist())]
 
     def atoms(self, view: View) -> list[Shift]:
         return [shift for shift in self.gradient(view)[:9] if shift is not None]

@@ -63,7 +63,7 @@ def causes(
     spread = _spread(squares, parts, claims, labels)
     given = np.array([claim.share for claim in claims])
     if result.dense:
-        whole = np.where(np.isnan(given), whole, given)
+        claims, whole, spread = _beside_set_up(claims, whole, spread, left.beliefs.unexplained)
     else:
         whole, spread = _as_placed(whole, spread, given, placing)
     beside = 1.0 - float(whole.sum())
@@ -84,6 +84,22 @@ def causes(
     # What has no place either says nothing that somebody could begin with.
     out.sort(key=lambda cause: (not cause.place, -cause.share))
     return tuple(out), Shares(unexplained=remaining, noise=max(noise, 0.0))
+
+
+def _beside_set_up(
+    claims: Sequence[Cause], whole: Array, spread: Array, least: float
+) -> tuple[list[Cause], Array, Array]:
+    """
+    Return claims of many small errors with shares of the whole gap.
+
+    Kinds have shares of what the set-up's motion leaves. A motion of no more than the least share is
+    none: it may be what the laws of the kinds do not quite follow.
+    """
+    given = np.array([claim.share for claim in claims])
+    moved = np.isnan(given)
+    whole = np.where(moved, whole, given * (1.0 - float(whole[moved].sum())))
+    told = ~moved | (whole > least)
+    return [c for c, one in zip(claims, told, strict=True) if one], whole[told], spread[told]
 
 
 def _cause(
@@ -175,10 +191,8 @@ def _nameless(
         stand_in = _cause(beside, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
         return ([*claims, stand_in], _rest([])) if beside else (claims, stand_in)
     by_curves = {at for members in curves_at.values() for at in members}
-    for k, effect in enumerate(model):
+    for k, effect in enumerate(model if curved is not None else ()):
         if k in taken | by_curves or effect.traits.bends:
-            continue
-        if curved is None and not effect.traits.of_setup:
             continue
         if not effect.traits.cause and curves_at.get(effect.at):
             # How a set-up moved is nuisance, and no name beside the curves of that place.
@@ -262,7 +276,9 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[Cause]:
         group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
         levels = place, dependence, dict(sites)
         out.append(_cause(members, *levels, share=family.share, effect=group))
-    return out
+    # How the set-up moved is no kind that could be taken out, but it is a part of the gap.
+    moved = ((k, e) for k, e in enumerate(model) if e.traits.of_setup and not e.traits.cause)
+    return out + [_cause((k,), {e.at: 1.0}, {e.on: 1.0}, {}) for k, e in moved]
 
 
 def _contributions(unseen: Unseen) -> Array:

@@ -19,6 +19,7 @@ from weld_twin_core.effects import (
     REGISTRY,
     GearRatio,
     JointOffset,
+    JointWarmUp,
     LinkTwist,
     MeasurementScale,
     TransmissionRipple,
@@ -165,6 +166,24 @@ def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot)
     many = fitted_together(found, without, Beliefs(), lambda text: None).final.model
     assert 'drift' in {e.name for e in few.found} - {e.name for e in many.found}
     assert off(many, rest) < off(few, rest)
+
+
+def test_a_zero_that_drifts_is_no_turn_of_the_set_up(robot):
+    """A turn about joint 1 is six numbers of the base as well; the joint has it with one."""
+    rng = np.random.default_rng(5)
+    errors = [
+        kind(j, 1e-4 * rng.standard_normal())
+        for kind in (REGISTRY[name] for name in GEOMETRY[:4])
+        for j in robot.joint_names
+    ]
+    warm = JointWarmUp(robot.joint_names[0], 8e-4, 150.0)
+    problem, start = aligned([stations(robot, 0.6, [*errors, warm])], robot, 'base', ())
+    found = start.with_found((warm,))
+    model = many_small(problem, found, [], Beliefs(), lambda text: None)[0].model
+    (drifting,) = (e for e in model.found if e.name == 'joint_warm_up')
+    assert drifting.joint == robot.joint_names[0]
+    assert drifting.offset == pytest.approx(8e-4, rel=0.2)
+    assert not any(e.traits.of_setup for e in model.found)
 
 
 def test_one_wrong_scale_is_not_ten_wrong_links(robot):

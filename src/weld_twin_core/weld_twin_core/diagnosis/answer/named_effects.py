@@ -128,12 +128,9 @@ def covariance(
 
 def _free(model: Model) -> NDArray[np.bool_]:
     """Return which fit coordinates are off their bounds, shape (K,)."""
-    out: list[bool] = []
-    for effect in model.found:
-        specs = [effect.components()[k][0] for k in effect.fit.fitted()]
-        pairs = zip(specs, effect.fit.coordinates(), strict=True)
-        out += [p.lower < value < p.upper for p, value in pairs]
-    return np.array(out, dtype=bool)
+    specs = [effect.components()[k][0] for effect in model.found for k in effect.fit.fitted()]
+    pairs = zip(specs, coordinates(model), strict=True)
+    return np.array([p.lower < value < p.upper for p, value in pairs], dtype=bool)
 
 
 def _visible(columns: Columns, model: Model) -> NDArray[np.bool_]:

@@ -333,12 +333,9 @@ class Track:
 
     def gap(self, base: Array, tool: Array) -> Array:
         """Return how far each sample is off, position and turn together, shape (M,) [m]."""
-        turn = base[:3, :3] @ self.turn
-        reached = self.point @ base[:3, :3].T + base[:3, 3] + turn @ tool[:3, 3]
-        off: Array = np.linalg.norm(self.position - reached, axis=1)
-        if self.rotation is None:
-            return off
-        return off + LEVER * chord(self.rotation, turn @ tool[:3, :3])
+        frame = Bases(base[None, None, :3, :3], base[None, None, :3, 3])
+        own = Track.side_by_side([self])
+        return np.asarray(_gaps(own, frame, tool[None, :3, :3], tool[None, None, :3, 3])[0, 0])
 
     @property
     def turns(self) -> Array:

@@ -207,11 +207,10 @@ def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -
     if [_site(change) for change in problem.changes] == before:
         return result
     work = replace(result.work, problem=replace(result.work.problem, changes=problem.changes))
-    small = replace(result.small.model, changes=final.model.changes)
+    small = replace(result.small, model=replace(result.small.model, changes=final.model.changes))
     start = replace(result.baseline.model, changes=final.model.changes)
     bare, _ = robust_fit(problem, start)
-    small_fit = replace(result.small, model=small)
-    return replace(result, work=work, small=small_fit, baseline=bare)
+    return replace(result, work=work, small=small, baseline=bare)
 
 
 def _site(change: Change) -> tuple[int, str, str | None]:

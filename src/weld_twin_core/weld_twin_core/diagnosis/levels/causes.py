@@ -333,11 +333,10 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     others = tuple(k for k in range(len(fields)) if k not in named)
     groups = [cause.members for cause in causes] + [others] * bool(others)
     parts = np.array([fields[list(group)].sum(axis=0) for group in groups])
-    remaining = unseen.whole
-    rest = unseen.bare - remaining - parts.sum(axis=0)
+    rest = unseen.bare - unseen.whole - parts.sum(axis=0)
     sizes = (parts**2).mean(axis=1)
     parts += rest * (sizes / max(float(sizes.sum()), EMPTY))[:, None]
-    metres = [unseen.problem.measured_rows(part, unseen.scale) for part in (remaining, *parts)]
+    metres = [unseen.problem.measured_rows(part, unseen.scale) for part in (unseen.whole, *parts)]
     split = [[each[:, :3] for each in own] for own in metres]
     return Contributions(
         left=tuple(split[0]),

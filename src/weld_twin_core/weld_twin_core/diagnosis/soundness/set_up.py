@@ -160,7 +160,7 @@ def orientation(case: Case) -> Sequence[Finding]:
             return (suspicion._replace(sentence=sentence),)
     return (
         warning(
-            f'Measured orientations disagree with the joints by {np.degrees(turned):.3g} degrees '
+            f'Measured orientations disagree with the joints by {_angle(turned)} '
             '(median) though positions agree; check their convention, or give positions only.'
         ),
     )

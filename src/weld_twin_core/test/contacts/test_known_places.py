@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.frames.aligned import aligned, other_causes
 from weld_twin_core.diagnosis.predicting.allowed import left_open
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import reaching
+from weld_twin_core.twin.posterior import expected_poses, largest_sigma
 
 SIZE = [0.3, 0.24, 0.2]
 AT = [0.45, 0.1, 0.2]
@@ -96,6 +97,38 @@ def test_a_base_that_is_not_known_is_found_beside_the_cause(robot):
     assert named(diagnosis) == [('joint_offset', 'elbow_joint')]
     base = diagnosis.model.bases[0]
     np.testing.assert_allclose(base[:3, 3] - robot.T_world_base[:3, 3], shift, atol=3e-4)
+
+
+def test_pins_at_known_places_tell_together_where_the_base_stands(robot):
+    """Each pin alone leaves the turn about it open; all of them are touched by one arm on one base."""
+    rng = np.random.default_rng(6)
+    bent = replace(robot, theta=robot.theta + 0.002 * (np.arange(6) == 2))
+    real = moved(bent, np.array([0.02, 0.03, -0.01]))
+    pins = np.array([[0.5, 0.1, 0.2], [0.3, -0.4, 0.4], [-0.2, 0.5, 0.3], [0.4, 0.4, 0.6]])
+    known = {
+        f'pin {k}': {'kind': 'point', 'at': at.tolist(), 'sigma': 5e-5}
+        for k, at in enumerate(pins)
+    }
+    q, labels = [], []
+    for name, at in zip(known, pins, strict=True):
+        postures, good = reaching(real, np.tile(at, (60, 1)), rng.uniform(-2.0, 2.0, (60, 6)))
+        q.append(postures[good][:EACH])
+        labels += [name] * len(q[-1])
+    every = np.concatenate(q) + rng.normal(0.0, NOISE, (len(labels), 6))
+    motion = wt.JointMotion(np.arange(float(len(every))), every, static=True)
+    contacts = Contacts(Artefact.from_mapping({'contacts': known}), tuple(labels))
+
+    found = wt.diagnose(
+        wt.Recording('pins', motion, contacts=contacts), robot, align='base', experiment=False
+    )
+
+    others = np.concatenate([part[:4] + 0.1 for part in q])
+    still = wt.Recording('others', wt.JointMotion(np.arange(16.0), others, static=True))
+    told, covariance = expected_poses(found.posterior, found.model.twin(0), still, still.joints.t)
+    off = told.position - wt.Twin(real).poses(still).position
+    sigma = largest_sigma(covariance)
+    assert sigma.max() < 1e-3
+    assert (np.linalg.norm(off, axis=1) < 3.0 * sigma).all()
 
 
 def test_faces_of_a_block_lie_as_far_apart_as_its_size(robot):

@@ -111,7 +111,8 @@ class Directions:
     """What may differ between the models that the recordings allow."""
 
     frames: tuple[str, ...]
-    """Those of 'base' and 'tool' that were fitted, six coordinates each, a base for every set-up."""
+    """Those of 'base' and 'tool' that were fitted, six coordinates each, a base for every set-up: places
+    that were touched share one."""
     setups: int
     """Number of base frames."""
     effects: tuple[Effect, ...]

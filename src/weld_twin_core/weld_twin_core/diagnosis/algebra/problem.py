@@ -135,6 +135,10 @@ class Problem:
                 out.setdefault(key, []).append(k)
         return tuple(tuple(group) for group in out.values())
 
+    def stand(self, k: int) -> int:
+        """Return which of `stands` recording k is of, or one more where it tells nothing of a base."""
+        return next((at for at, own in enumerate(self.stands) if k in own), len(self.stands))
+
     @property
     def own_bases(self) -> bool:
         return 'base' in self.align and not self.touched and len(self.recordings) > 1

@@ -161,7 +161,7 @@ def _noisy(scale: Scale) -> Scale:
 def _directions(problem: Problem, model: Model) -> Directions:
     return Directions(
         tuple(frame for frame in ('base', 'tool') if frame in problem.align),
-        len(problem.recordings),
+        1 + max(problem.stand(k) for k in range(len(problem.recordings))),
         plausible_arm.directions(model.robot, model.found),
         plausible_arm.fine_knots(_joints(problem)),
         0 if problem.at_rest else model.robot.n,
@@ -199,7 +199,7 @@ def _joints(problem: Problem) -> list[Array]:
 
 def _rows(problem: Problem, model: Model, scale: Scale, what: Directions, prior: Prior) -> Rows:
     features = problem.features(model)
-    whole = [what.columns(maker, k) for k, maker in enumerate(features)]
+    whole = [what.columns(maker, problem.stand(k)) for k, maker in enumerate(features)]
     parts = [problem.seen(k, part) for k, part in enumerate(whole)]
     residual = problem.whitened(problem.residuals(model), scale)
     columns, left = problem.whitened(parts, scale), residual

@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.evidence import Alternative
 from weld_twin_core.diagnosis.hypotheses.search import borne_out
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.effects import REGISTRY
+from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.posterior import expected_poses
 
 STILL = 'wrist_2_joint'
@@ -165,3 +166,26 @@ def test_a_sure_leader_is_not_asked():
         raise AssertionError('held-out data were asked')
 
     assert borne_out(Found(candidate_sets), never, Beliefs()).candidate_sets == candidate_sets
+
+
+def test_an_arm_may_have_grown_where_it_is_known_how_warm_it_was(robot):
+    """All metals grow: on a warmer day the arm is less sure, and no program has to say how warm."""
+    zero = wt.effects.JointOffset('elbow_joint', 1e-3)
+    warm, cold = (motion(robot, [zero], 0.8).at_temperature(at) for at in (26.0, 20.0))
+    known, seen, plain = (
+        wt.diagnose(one, robot, experiment=False).posterior
+        for one in (warm, cold, motion(robot, [zero], 0.8))
+    )
+    names = known.directions.names()
+    assert 'thermal_growth 0' in names and 'thermal_growth 0' not in plain.directions.names()
+    # Aluminium grows by 2.4e-5 per K, and a recording at one temperature says no more of it.
+    growth = np.sqrt(np.diag(known.covariance))[names.index('thermal_growth 0')]
+    assert 1e-6 < growth < 3e-5
+    effects, _ = known.of_the_arm().centred([zero])
+    assert 'thermal_growth' not in {effect.name for effect in effects}
+    features = [
+        Features(wt.Twin(robot, effects), one, one.joints.t[:1])
+        for one in (cold.at_temperature(32.0), cold)
+    ]
+    hot, same = (np.trace(seen.pose_covariance(one)[0, :3, :3]) for one in features)
+    assert hot > 1.5 * same

@@ -233,8 +233,13 @@ class Posterior:
         effects = []
         waves = [effect for effect in result if effect.traits.waves is not None]
         ours = {effect.key for effect in self.directions.effects}
+        found = {effect.key for effect in result}
         for effect, here in zip(self.directions.effects, self.directions.own, strict=True):
             now = effect.fit.coordinates()
+            if 'temperature' in effect.needs and effect.key not in found:
+                step[here] = 0.0  # a motion to come need not say how warm it is
+                effects.append(effect)
+                continue
             if effect.traits.waves is not None:
                 # Waves of a joint add up: those found stay as they are, beside what is missing.
                 effects.append(effect.fit.with_coordinates(step[here]))
@@ -248,7 +253,8 @@ class Posterior:
         what = replace(self.directions, effects=tuple(effects))
         centred = replace(self, directions=what, mean=self.mean - step, single=None, middle=0.0)
         frames = () if setup is None else self._moved_frames(setup)
-        return (*effects, *waves, *others, *frames), centred
+        moving = (e for e in effects if e.key in found or 'temperature' not in e.needs)
+        return (*moving, *waves, *others, *frames), centred
 
     def _moved_frames(self, setup: int) -> tuple[Effect, ...]:
         """Return how far the middle of the allowed models has fitted frames from the fit."""

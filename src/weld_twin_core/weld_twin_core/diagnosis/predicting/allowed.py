@@ -31,6 +31,8 @@ from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array, spread_over
 from ...effects.dated import of_the_robot
+from ...effects.effect import Effect
+from ...effects.thermal import ThermalGrowth
 from ...twin.directions import Directions
 from ...twin.domain import Domain
 from ...twin.features import shown
@@ -82,7 +84,7 @@ def allowed(
     recordings = problem.recordings
     jumps = sum(shown(f, max(scale.position, MICROMETRE)) for f in problem.features(model))
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
-    what = _directions(problem, model)
+    what = _with_growth(_directions(problem, model), problem, model)
     prior = _prior(what, model)
     rows = _rows(problem, model, scale, what, prior)
     models = weighed(rows, prior, _expected(problem, scale))
@@ -166,6 +168,20 @@ def _directions(problem: Problem, model: Model) -> Directions:
         plausible_arm.fine_knots(_joints(problem)),
         0 if problem.at_rest else model.robot.n,
     )
+
+
+def _with_growth(what: Directions, problem: Problem, model: Model) -> Directions:
+    """Return the same with links that grow, as all do, where it is known how warm it was."""
+    known = {effect.name for effect in what.effects}
+    warm = all(view.temperature is not None for view in (f.view for f in problem.features(model)))
+    if not warm or ThermalGrowth.name in known:
+        return what
+    return replace(what, effects=(*what.effects, ThermalGrowth()))
+
+
+def _only_grows(effect: Effect, model: Model) -> bool:
+    """Return whether an effect is growth with the warmth that no cause was found to be."""
+    return effect.name == ThermalGrowth.name and all(e.name != effect.name for e in model.found)
 
 
 def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:
@@ -254,6 +270,7 @@ def _prior(what: Directions, model: Model) -> Prior:
     """Return the prior of frames, effects, gives, and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
     group, gears = plausible_arm.groups(effects)
+    group[np.repeat([_only_grows(e, model) for e in effects], what.sizes)] = -1
     sizes = [k.size for k in what.knots]
     springs = int(what.gives > 0)
     gives = np.full(what.gives, gears.size)

@@ -61,7 +61,8 @@ class Prior:
 
     middle: Array  # counted from the fit, shape (P,)
     width: Array  # standard deviation of a usual one, shape (P,)
-    group: NDArray[np.int_]  # family, -1 for frames, which are as wide as they are, shape (P,)
+    group: NDArray[np.int_]
+    """Family, shape (P,); -1 for what is as wide as it is: frames, and links that grow, as all do."""
     gears: NDArray[np.bool_]
     """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
     geometry."""
@@ -152,7 +153,7 @@ def with_prior(information: Array) -> Array:
 def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which coordinates, but those of frames, no data like these could show, shape (P,)."""
     columns = rows.columns
-    basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
+    basis = np.linalg.svd(columns[frames & columns.any(axis=1)], full_matrices=False)[2]
     square = np.einsum('ij,ij->i', columns, columns)
     own = square if rows.moved is None else rows.moved**2
     remaining = square - ((columns @ basis.T) ** 2).sum(axis=1)

@@ -31,8 +31,7 @@ from scipy.linalg.lapack import dtrtri
 
 from ...arrays import Array, spread_over
 from ...effects.dated import of_the_robot
-from ...effects.effect import Effect
-from ...effects.thermal import ThermalGrowth
+from ...effects.effect import REGISTRY, Effect
 from ...twin.directions import Directions
 from ...twin.domain import Domain
 from ...twin.features import shown
@@ -55,6 +54,7 @@ from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
 POSTURES = 100
 """Enough for a median to be good to some per cent."""
+_WARMTH = frozenset({'temperature'})
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 Rooted = Callable[[Products], tuple[Array, Array]]
@@ -171,17 +171,17 @@ def _directions(problem: Problem, model: Model) -> Directions:
 
 
 def _with_growth(what: Directions, problem: Problem, model: Model) -> Directions:
-    """Return the same with links that grow, as all do, where it is known how warm it was."""
-    known = {effect.name for effect in what.effects}
-    warm = all(view.temperature is not None for view in (f.view for f in problem.features(model)))
-    if not warm or ThermalGrowth.name in known:
+    """Return the same with what every arm does as it warms up, where it is known how warm it was."""
+    if any(maker.view.temperature is None for maker in problem.features(model)):
         return what
-    return replace(what, effects=(*what.effects, ThermalGrowth()))
+    known = {effect.name for effect in what.effects}
+    grown = (k for k in REGISTRY.values() if k.needs == _WARMTH and k.name not in known)
+    return replace(what, effects=(*what.effects, *(kind() for kind in grown)))
 
 
 def _only_grows(effect: Effect, model: Model) -> bool:
     """Return whether an effect is growth with the warmth that no cause was found to be."""
-    return effect.name == ThermalGrowth.name and all(e.name != effect.name for e in model.found)
+    return effect.needs == _WARMTH and all(e.name != effect.name for e in model.found)
 
 
 def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> Posterior:

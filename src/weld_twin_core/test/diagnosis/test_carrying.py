@@ -181,8 +181,15 @@ def test_an_arm_may_have_grown_where_it_is_known_how_warm_it_was(robot):
     # Aluminium grows by 2.4e-5 per K, and a recording at one temperature says no more of it.
     growth = np.sqrt(np.diag(known.covariance))[names.index('thermal_growth 0')]
     assert 1e-6 < growth < 3e-5
-    effects, _ = known.of_the_arm().centred([zero])
+    effects, centred = known.of_the_arm().centred([zero])
     assert 'thermal_growth' not in {effect.name for effect in effects}
+    # What it grew by that day is in its lengths: the models without growth are in the middle.
+    grown = centred.directions.names().index('thermal_growth 0')
+    without = centred.mean - centred.covariance[:, grown] * (
+        centred.mean[grown] / centred.covariance[grown, grown]
+    )
+    of_lengths = [k for k, n in enumerate(centred.directions.names()) if n.startswith('link_')]
+    assert np.abs(without[of_lengths]).max() < 1e-9
     features = [
         Features(wt.Twin(robot, effects), one, one.joints.t[:1])
         for one in (cold.at_temperature(32.0), cold)

@@ -229,17 +229,12 @@ class Posterior:
         """
         if self.middle == 0.0:
             return tuple(result), self
-        step = self.middle * self.mean
+        step, grown = self._step(result)
         effects = []
         waves = [effect for effect in result if effect.traits.waves is not None]
         ours = {effect.key for effect in self.directions.effects}
-        found = {effect.key for effect in result}
         for effect, here in zip(self.directions.effects, self.directions.own, strict=True):
             now = effect.fit.coordinates()
-            if 'temperature' in effect.needs and effect.key not in found:
-                step[here] = 0.0  # a motion to come need not say how warm it is
-                effects.append(effect)
-                continue
             if effect.traits.waves is not None:
                 # Waves of a joint add up: those found stay as they are, beside what is missing.
                 effects.append(effect.fit.with_coordinates(step[here]))
@@ -252,13 +247,31 @@ class Posterior:
         others = [effect for effect in result if effect.key not in ours and effect not in waves]
         what = replace(self.directions, effects=tuple(effects))
         centred = replace(self, directions=what, mean=self.mean - step, single=None, middle=0.0)
-        frames = () if setup is None else self._moved_frames(setup)
-        moving = (e for e in effects if e.key in found or 'temperature' not in e.needs)
-        return (*moving, *waves, *others, *frames), centred
+        frames = () if setup is None else self._moved_frames(setup, step)
+        there = (effect for effect in effects if effect.key not in grown)
+        return (*there, *waves, *others, *frames), centred
 
-    def _moved_frames(self, setup: int) -> tuple[Effect, ...]:
+    def _step(self, result: Sequence[Effect]) -> tuple[Array, set[tuple[Any, ...]]]:
+        """
+        Return how far the middle is from the fit, (P,), and what has no part in it, by key.
+
+        A motion to come need not say how warm the arm is. So what goes with the warmth and was not
+        found is none there, and the middle is that of the models without: what a warm arm has grown
+        by is in its lengths (conditional mean of a normal vector, Bishop 2006, eq. 2.81).
+        """
+        what, found = self.directions, {effect.key for effect in result}
+        grown = {e.key for e in what.effects if 'temperature' in e.needs} - found
+        held = np.zeros(what.count, dtype=bool)
+        for effect, here in zip(what.effects, what.own, strict=True):
+            held[here] = effect.key in grown
+        inverse = np.linalg.pinv(self.covariance[np.ix_(held, held)], hermitian=True)
+        step = self.mean - self.covariance[:, held] @ (inverse @ self.mean[held])
+        step[held] = 0.0
+        return self.middle * step, grown
+
+    def _moved_frames(self, setup: int, step: Array) -> tuple[Effect, ...]:
         """Return how far the middle of the allowed models has fitted frames from the fit."""
-        step, what = self.middle * self.mean, self.directions
+        what = self.directions
         at = {'base': 6 * setup, 'tool': what.frame_count - 6}
         kinds: dict[str, type[FrameError]] = {'base': BasePose, 'tool': ToolPose}
         each = {name: step[at[name] : at[name] + 6] for name in what.frames}

@@ -102,6 +102,8 @@ class Search:
     """Whether many small errors were fitted together."""
     refused: tuple[Effect, ...] = ()
     """What would explain the rest best, but no machine has."""
+    few: Search | None = None
+    """Where many predict unseen data better: what was found one by one, if that was finished."""
     many: Search | None = None
     """All kinds fitted together, where that predicts about as well as the few do."""
 

@@ -161,11 +161,12 @@ def _explained(
     out = _conclude(result, examined, holdout, beliefs, limits, progress)
     # Where the answer that no name fits is itself probably right, the many are not tried.
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
-    if result.many is None or out.status != 'unknown' or _named(out) or nameless:
+    other = result.few or (None if out.status != 'unknown' or nameless else result.many)
+    if other is None or _named(out):
         return out
-    progress('a few effects leave the cause unknown: all kinds together')
-    many = _conclude(result.many, examined, holdout, beliefs, limits, progress)
-    return many if _named(many) else out
+    progress('nothing is named: the other way to explain it')
+    instead = _conclude(other, examined, holdout, beliefs, limits, progress)
+    return instead if _named(instead) else out
 
 
 def _without_slips(

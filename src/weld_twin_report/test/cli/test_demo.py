@@ -55,7 +55,7 @@ def test_the_demo_leaves_bag_table_and_picture_that_agree(tmp_path):
         json.loads((out / name / 'diagnosis.json').read_text())['verdict']
         for name in ('diagnosis', 'open')
     )
-    assert clear['status'] == 'identified' and clear['sure']
+    assert clear['status'] == 'identified' and clear['confidence'] > 0.9
     assert unclear['status'] == 'ambiguous'
     said = (out / 'summary.txt').read_text().replace('\N{NO-BREAK SPACE}', ' ').splitlines()
     told = [line for line in said if line.startswith(('The gap', 'With', 'Either'))]

@@ -68,7 +68,7 @@ def fitted_together(
     # Several that were chosen on the parts left out as well have their lead by that.
     chosen = several and _relearned(best)
     if not chance and (result.crowded or remaining < (1.0 if chosen else beliefs.better) * few):
-        return best
+        return best if result.crowded else replace(best, few=result)
     return replace(result, many=best) if remaining < CHOSEN * few else result
 
 

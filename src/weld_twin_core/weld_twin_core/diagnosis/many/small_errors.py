@@ -159,14 +159,17 @@ def with_time(
     beliefs: Beliefs,
 ) -> Model:
     """
-    Return the model with what goes with time, the worthiest first, where it shows beside all the rest.
+    Return the model with the set-up's own creep and step in time, where they show beside all the rest.
 
-    That is an error of the robot or of the instrument, as the search has found it if it has, or the
-    set-up's own creep and step: these are nuisance, part of where the frames were.
+    Both are nuisance: they are part of where the frames were, not of the robot. Where they show, an
+    error of the robot or of the instrument that goes with time may be worth more, and is in their
+    place.
     """
+    if 'base' not in problem.align:
+        return model
     features, waiting = problem.features(model), list[Sequence[Effect]]()
     have = {(effect.name, effect.site) for effect in model.found}
-    setup = [k for k in REGISTRY.values() if k.traits.of_setup and 'base' in problem.align]
+    setup = [kind for kind in REGISTRY.values() if kind.traits.of_setup]
     for kind in (*candidate_kinds(problem.align), *setup):
         traits = kind.traits
         if traits.depends_on != 'time' or traits.dated or kind.name in exclude:
@@ -183,10 +186,10 @@ def with_time(
         # A turn of the base may be one number of a joint: each number has its price (Schwarz).
         worth = [chi - count * np.log(problem.size) for chi, count, _ in best]
         k = int(np.argmax(worth))
-        chi, _, effect = best[k]
-        if chi <= beliefs.setup_chi2:
+        moved = (chi for chi, _, effect in best if effect.traits.of_setup)
+        if max(moved, default=0.0) <= beliefs.setup_chi2 or best[k][0] <= beliefs.setup_chi2:
             break
-        model = model.with_found((*model.found, effect))
+        model = model.with_found((*model.found, best[k][2]))
         del waiting[k]
     return model
 

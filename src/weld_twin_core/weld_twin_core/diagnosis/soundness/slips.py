@@ -389,10 +389,11 @@ class _Seen:
             smooth = max(self._smooth(k), key=_sure)
             steps = list(self._steps(k))
             step, surest = _simplest(steps), max((t.sure for t in steps), default=0.0)
-            # A smooth shape was the best of many, as the instant of a step was, which has paid for it.
-            # Among the causes a step has to earn its place beside all others: here it is in front.
-            tried = float(np.log(len(self._shapes(k))))
-            if step is not None and surest > max(least, smooth.sure - tried):
+            # At rest a smooth shape was the best of many, as the instant of a step was, which has paid
+            # for it; and among the causes a step has to earn its place beside all others.
+            still = recording.joints.static
+            ahead = -float(np.log(len(self._shapes(k)))) if still else MARGIN
+            if step is not None and surest > max(least, smooth.sure + ahead):
                 trials.append(step._replace(sure=surest))
             elif smooth.sure > least:
                 trials.append(smooth)

@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import chain
+from xml.etree import ElementTree
+
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from page_table import page_table
@@ -18,7 +22,7 @@ from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
-from weld_twin_nodes.live.policy import COMMON, SPOKEN, Spoken
+from weld_twin_nodes.live.policy import policy
 from weld_twin_nodes.live.recorder import Recorder
 from weld_twin_nodes.live.settings import SHARED, Setting
 from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
@@ -35,16 +39,33 @@ NODES: dict[str, type[CellNode]] = {
     'recorder': Recorder,
 }
 
+WORDS = {
+    ('topics', 'publish'): 'publishes',
+    ('topics', 'subscribe'): 'hears',
+    ('services', 'reply'): 'answers',
+    ('services', 'request'): 'asks',
+    ('actions', 'execute'): 'offers the action',
+    ('actions', 'call'): 'sends goals to',
+}
+"""What the permissions of a policy are called on the page."""
+
 
 class Nodes(Directive):
     """One section for every node, with its parameters."""
 
     def run(self) -> list[nodes.Node]:
         """Return the sections."""
-        out = [
-            _section(name, node.__doc__ or '', node.settings, SPOKEN[name])
-            for name, node in NODES.items()
-        ]
+        profiles = ElementTree.fromstring(policy()).iter('profile')
+        allowed = {str(one.get('node')): dict(_permissions(one)) for one in profiles}
+        # What every node may, whatever it is for, is on no node's list.
+        common = set.intersection(*(set(chain(*own.values())) for own in allowed.values()))
+        out = []
+        for name, node in NODES.items():
+            spoken = {
+                words: [n for n in allowed[name].get(words, []) if n not in common]
+                for words in WORDS.values()
+            }
+            out.append(_section(name, node.__doc__ or '', node.settings, spoken))
         return [*out, _section('Every node', 'Parameters that all of them have.', SHARED)]
 
 
@@ -64,24 +85,24 @@ def _quality(qos: Qos) -> str:
     return f'{qos.reliability.replace("_", " ")}, last {qos.depth}{latched}'
 
 
+def _permissions(profile: ElementTree.Element) -> Iterator[tuple[str, list[str]]]:
+    for group in profile:
+        for verb in group.attrib:
+            yield WORDS[group.tag, verb], [str(name.text) for name in group]
+
+
 def _section(
-    name: str, text: str, settings: tuple[Setting, ...], spoken: Spoken | None = None
+    name: str,
+    text: str,
+    settings: tuple[Setting, ...],
+    spoken: dict[str, list[str]] | None = None,
 ) -> nodes.section:
     section = nodes.section(ids=[f'node-{name.replace(" ", "-").lower()}'], names=[name])
     section += nodes.title(text=name)
     section += nodes.paragraph(text=text.strip().partition('\n\n')[0])
-    if spoken is not None:
-        for words, names in (
-            ('publishes', spoken.publishes),
-            ('hears', spoken.hears),
-            ('answers', spoken.answers),
-            ('asks', spoken.asks),
-            ('offers the action', spoken.does),
-            ('sends goals to', spoken.sends),
-        ):
-            own = [n for n in names if n not in COMMON]
-            if own:
-                section += nodes.paragraph(text=f'{words}: {", ".join(own)}')
+    for words, names in (spoken or {}).items():
+        if names:
+            section += nodes.paragraph(text=f'{words}: {", ".join(names)}')
     section += page_table(
         ('parameter', 'meaning', 'default', 'range', 'while running'),
         [

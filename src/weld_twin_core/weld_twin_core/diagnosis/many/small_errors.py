@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,10 +57,8 @@ def many_small(
     progress: Callable[[str], None],
 ) -> tuple[Fit, Scale, Array]:
     """Return the fit of all families together, its noise and its prior precision."""
-    found, everything = (
-        model.found,
-        model.with_found(_everything(problem, model, exclude, beliefs)),
-    )
+    found = model.found
+    everything = model.with_found(_everything(problem, model, exclude, beliefs))
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale, beliefs)
     model = model.with_found(tuple(effect.fit.turned() for effect in model.found))
@@ -171,8 +170,7 @@ def with_time(
     have = {(effect.name, effect.site) for effect in model.found}
     setup = [kind for kind in REGISTRY.values() if kind.traits.of_setup]
     for kind in (*candidate_kinds(problem.align), *setup):
-        traits = kind.traits
-        if traits.depends_on != 'time' or traits.dated or kind.name in exclude:
+        if kind.traits.depends_on != 'time' or kind.traits.dated or kind.name in exclude:
             continue
         for joint in joints_of(kind, model.robot):
             if (kind.name, joint) in have or lacking(features, kind, joint) is not None:
@@ -181,26 +179,34 @@ def with_time(
             own = [e for e in found if (e.name, e.site) == (kind.name, joint)]
             if tried := own or [seed for seed in seeds if not hardly_moves(features, seed)]:
                 waiting.append(tried)
-    while waiting:
-        best = [_best_of(problem, model, seeds, scale) for seeds in waiting]
+    while True:
+        features = problem.features(model)
+        span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
+        residual = outside(problem.whitened(problem.residuals(model), scale), span)
+        best_of = partial(_best_of, problem, features, span, residual, scale)
+        moved = [best_of(seeds) for seeds in waiting if seeds[0].traits.of_setup]
+        # Mostly the set-up stood still, and nothing else is asked.
+        if max((chi for chi, *_ in moved), default=0.0) <= beliefs.setup_chi2:
+            return model
+        best = [best_of(seeds) for seeds in waiting]
         # A turn of the base may be one number of a joint: each number has its price (Schwarz).
         worth = [chi - count * np.log(problem.size) for chi, count, _ in best]
         k = int(np.argmax(worth))
-        moved = (chi for chi, _, effect in best if effect.traits.of_setup)
-        if max(moved, default=0.0) <= beliefs.setup_chi2 or best[k][0] <= beliefs.setup_chi2:
-            break
+        if best[k][0] <= beliefs.setup_chi2:
+            return model
         model = model.with_found((*model.found, best[k][2]))
         del waiting[k]
-    return model
 
 
 def _best_of(
-    problem: Problem, model: Model, seeds: Sequence[Effect], scale: Scale
+    problem: Problem,
+    features: list[Features],
+    span: Array,
+    residual: Array,
+    scale: Scale,
+    seeds: Sequence[Effect],
 ) -> tuple[float, int, Effect]:
     """Return what the best of some seeds takes off chi-square, its numbers, and that one itself."""
-    features = problem.features(model)
-    span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
-    residual = outside(problem.whitened(problem.residuals(model), scale), span)
     tried = list[tuple[float, int, Effect]]()
     for seed in seeds:
         own = outside(problem.whitened(problem.effect_columns(features, seed), scale), span)

@@ -57,7 +57,7 @@ def recorded(
     effects,
     seed=1,
     *,
-    seconds=15.0,
+    seconds=8.0,
     static=0,
     orientation=True,
     warm=False,

@@ -219,7 +219,7 @@ def test_modes_that_fit_as_well_widen_the_error_of_a_frequency(slow):
 def test_a_spring_that_is_named_for_sure_is_known_to_more_than_its_own_size():
     # What every arm has a little of can stand in for it, but so much of it at once is no likelier.
     robot = wt.load('ur5')
-    motion = wt.plan(robot, wt.default_seam(robot, 'polyline'), 'smooth', rate_hz=50.0).motion
+    motion = wt.plan(robot, wt.default_seam(robot, 'polyline'), 'smooth', rate_hz=25.0).motion
     play = wt.effects.Backlash('shoulder_pan_joint', width=8e-4)
     spring = wt.effects.JointCompliance('shoulder_lift_joint', compliance=8e-6)
     commanded = wt.Recording('seam', motion)

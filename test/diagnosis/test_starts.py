@@ -94,7 +94,7 @@ def test_wide_play_that_the_load_moves_leaves_no_curve_for_springs_of_its_joint(
 
 @pytest.mark.parametrize('kind', ['joint_compliance', 'loaded_play'])
 def test_a_joint_at_rest_gives_way_as_others_change_its_load(kind):
-    robot, t = load('ur5'), np.arange(0.0, 20.0, 0.02)
+    robot, t = load('ur5'), np.arange(0.0, 20.0, 0.04)
     q = np.tile(HOME[:6], (t.size, 1))
     q[:, 1] += 1.2 * np.sin(0.5 * t)
     run = Recording('swing', JointMotion(t, q))

@@ -34,7 +34,7 @@ ROBOTS = {'left': 'ur5', 'right': 'ur10'}
 OFFSETS = {'left': 1e-3, 'right': -2e-3}
 
 
-def motion(seconds=2.0, rate=50.0):
+def motion(seconds=1.0, rate=50.0):
     t = np.arange(0.0, seconds, 1.0 / rate)
     rest = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
     return JointMotion(t, rest + 0.2 * np.sin(np.outer(t, np.arange(1.0, 7.0))))

@@ -21,6 +21,7 @@ from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf
 from weld_twin_nodes.cli.in_process import weld_twin
 
 WIDTH, OFFSET, DELAY = 1.0e-3, 1.5e-3, 0.012
+NOISE = np.sqrt(3) * 2e-5
 FILES = {'diagnosis.json', 'report.html', 'effects.yaml', 'robot.yaml', 'robot.urdf'}
 FILES |= {'joint_offsets.csv', 'robot_effects.yaml', '.weld_twin_files.json'}
 
@@ -63,6 +64,9 @@ def test_play_is_found_with_its_width_and_told_in_files_and_on_the_terminal(cell
     assert [(e['effect'], e['joint']) for e in verdict['effects']] == [('backlash', 'elbow_joint')]
     assert verdict['effects'][0]['parameters']['width'] == pytest.approx(WIDTH, rel=0.05)
     assert (shrink['held_out'], shrink['ratio'] < 0.3) == ('second', True)
+    assert shrink['rms_after_m'] == pytest.approx(NOISE, rel=0.15)
+    assert shrink['ratio'] == pytest.approx(shrink['rms_after_m'] / shrink['rms_before_m'])
+    assert shrink['ci95'][0] < shrink['ratio'] < shrink['ci95'][1] < 0.5
     assert {path.name for path in found.iterdir()} == FILES
     assert not [path for path in found.parent.iterdir() if path.name.startswith('.')]
     digest = digest_of(cell / 'first')
@@ -78,7 +82,8 @@ def test_what_is_known_is_in_the_twin_from_the_start_and_what_is_excluded_never_
     words = ('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml')
     done(*words, '--exclude-effect', 'servo_lag', '--out', tmp_path / 'rest')
     data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
-    assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
+    assert data['gap']['rms_m'] == pytest.approx(NOISE, rel=0.1)
+    assert (data['verdict']['status'], data['verdict']['effects']) == ('none', [])
     play = {'effect': 'backlash', 'joint': 'elbow_joint', 'width': WIDTH}
     assert data['model']['known'][0] == play
     named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}

@@ -328,6 +328,8 @@ class Recording:
     """Shape (K,) [degC]."""
     epoch_ns: int = 0
     """What the stamps count from, [ns] since 1970."""
+    later: float = 0.0
+    """How much later its stamps are on the clock by which effects are dated [s]; see `on_one_clock`."""
     notes: tuple[str, ...] = ()
     """What a reader should know of it, in sentences."""
     incomplete: tuple[str, ...] = ()
@@ -419,6 +421,11 @@ class Recording:
         return self.epoch_ns >= FIRST_DATE_NS
 
     @property
+    def clock_ns(self) -> int:
+        """Return what instants of effects count from, [ns] since 1970."""
+        return self.epoch_ns - round(self.later * 1e9)
+
+    @property
     def span_ns(self) -> tuple[int, int]:
         """Return first and last joint stamp [ns]."""
         ends = (round(float(self.joints.t[k]) * 1e9) for k in (0, -1))
@@ -495,3 +502,21 @@ def _kept(values: Iterable[Array | None]) -> None:
     for value in values:
         if value is not None:
             value.setflags(write=False)
+
+
+def on_one_clock(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
+    """
+    Return recordings with their dates on one clock, that of the first.
+
+    Stamps without a date tell of themselves alone: where such a recording begins before the one given
+    before it has ended, it is taken to follow it.
+    """
+    out: list[Recording] = []
+    for recording in recordings:
+        if out and recording.dated and out[0].dated:
+            later = (recording.epoch_ns - out[0].epoch_ns) * 1e-9
+        else:
+            ended = out[-1].joints.t[-1] + out[-1].later if out else -np.inf
+            later = max(float(ended - recording.joints.t[0]), 0.0)
+        out.append(replace(recording, later=later))
+    return tuple(out)

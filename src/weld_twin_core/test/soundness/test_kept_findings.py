@@ -291,7 +291,7 @@ def told(found, robot):
         undone = 'undone' if item.applied else 'not undone'
         out.append(f'{item.kind} {item.at} {item.alike} {undone}: {item.sentence} {item.remedy}')
     for slip in found.slips:
-        out.append(f'{slip.kind} t={slip.time:.1f} size={slip.size:.2g} {slip.alike}')
+        out.append(f'{slip.kind} t={slip.effect.time:.1f} size={slip.size:.2g} {slip.alike}')
     if found.posed is None:
         return [*out, 'not to be diagnosed']
     turned = found.given.robot.T_world_base[:3, :3] - robot.T_world_base[:3, :3]

@@ -230,7 +230,7 @@ def test_a_step_is_looked_for_all_but_at_the_very_ends(ur5, rng, at, found):
     part = problem.residuals(model)[0]
     part[:, at:] += np.array([[2e-3], [-2e-3], [1e-3]])
     steps = changes(problem, rest_of([part], problem, model), ur5.joint_names, 0.01)
-    times = [step.time for step in steps if isinstance(step, Slip)]
+    times = [step.effect.time for step in steps if isinstance(step, Slip)]
     assert (times == [at - 0.5]) is found
 
 

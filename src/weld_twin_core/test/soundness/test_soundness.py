@@ -3,7 +3,6 @@
 """What is refused, what raises no warning, and what gave way; each mistake: test_kept_findings."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from measured_cells import anywhere, asked, moving, recorded, rejointed, remeasu
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.known_arms import fingerprint
-from weld_twin_core.diagnosis import diagnose, pipeline
-from weld_twin_core.diagnosis.beliefs import Beliefs
+from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
 from weld_twin_core.diagnosis.soundness.mending import Given
@@ -166,7 +164,7 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     robot = ur5.with_frames(tool=anywhere(rng, 0.1))
     bad = recorded(robot, stations(ur5, rng), rng, effects)
     (slip,) = looked_at(robot, bad).slips
-    assert slip.kind == kind and slip.time == 60.5
+    assert slip.kind == kind and slip.time(bad) == 60.5
     found = diagnose([bad], robot, align='base,tool', exclude=MOVING, experiment=False)
     assert [(u.kind, u.applied) for u in found.unsound] == [(kind, True)]
     named = {(f.effect.name, f.effect.site) for f in found.effects}
@@ -174,41 +172,32 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     assert found.shrink.rms_after_m < 0.2 * found.shrink.rms_before_m
 
 
-def test_what_gave_way_in_one_of_several_recordings_is_told_where_nothing_explains_it(ur5, rng):
-    entry = {**SLIPS['joint_slipped'], 'time': 60.5}
-    plain = recorded(ur5, stations(ur5, rng), rng, name='plain')
-    bad = recorded(ur5, stations(ur5, rng), rng, effects_from_list([entry], ur5), name='bad')
-    found = examine(Given((plain, bad), ur5, frozenset()))
-    assert found.posed is not None and not found.unsound
-    problem, model = found.posed
-    (item,) = found.refusing_slips(problem, model).unsound
-    assert (item.kind, item.at, item.applied) == ('joint_slipped', ('elbow_joint',), False)
-    # A model that leaves no step, as where play that the load turns over only looked like one.
-    explained = replace(problem, recordings=(plain, replace(plain, name='bad')))
-    assert found.refusing_slips(explained, model) is found
-
-
-@pytest.mark.parametrize(
-    ('left_out', 'explained', 'sound'),
-    [((), True, False), (('backlash',), True, True), (('backlash',), False, False)],
-)
-def test_what_was_taken_out_of_the_library_may_be_what_looks_like_a_slip(
-    monkeypatch, left_out, explained, sound
-):
-    """What no effect of those asked for explains is asked of the whole library before it is refused."""
-    kept, refused = (SimpleNamespace(posed=posed) for posed in (('problem', 'model'), None))
-
-    def found(model):
-        return SimpleNamespace(problem='problem', final=SimpleNamespace(model=model))
-
-    def refusing(problem, model):
-        return kept if explained and model == 'of all' else refused
-
-    examined = SimpleNamespace(posed=('problem', 'nominal'), refusing_slips=refusing)
-    searched = ('of few', 'of all')
-    monkeypatch.setattr(pipeline, 'search', lambda _, __, out, *___: found(searched[not out]))
-    told = pipeline._without_slips(found('of few'), examined, left_out, Beliefs(), str)
-    assert told is (kept if sound else refused)
+@pytest.mark.parametrize('order', ['as recorded', 'the other way round'])
+@pytest.mark.parametrize('epoch', [0, 1_790_000_000 * 10**9])
+def test_of_several_recordings_those_after_it_have_what_gave_way(ur5, rng, epoch, order):
+    """The torch is hit in the first of two; in the second it stands so all the time."""
+    entry = {**SLIPS['reflector_jumped'], 'time': 60.5}
+    day = 86_400 * 10**9
+    hit = recorded(ur5, stations(ur5, rng), rng, effects_from_list([entry], ur5), name='hit')
+    after = recorded(
+        ur5,
+        stations(ur5, rng),
+        rng,
+        effects_from_list([{**entry, 'time': -1.0}], ur5),
+        name='after',
+    )
+    runs = [replace(hit, epoch_ns=epoch), replace(after, epoch_ns=epoch and epoch + day)]
+    if order != 'as recorded':
+        if not epoch:
+            pytest.skip('stamps without a date are taken in the order given')
+        runs.reverse()
+    found = diagnose(runs, ur5, align='base,tool', exclude=MOVING, experiment=False)
+    (named,) = [each.effect for each in found.effects if each.effect.name == 'tool_slip']
+    first = found.recordings[0]
+    assert first.clock_ns == runs[0].epoch_ns
+    assert named.time * 1e9 + first.clock_ns == pytest.approx(epoch + 60.5e9, abs=1e3)
+    assert [(u.kind, u.applied) for u in found.unsound] == [('reflector_jumped', True)]
+    np.testing.assert_allclose(named.xyz, entry['xyz'], atol=1e-4)
 
 
 def test_what_slipped_stays_so_and_no_program_is_moved_by_a_knock(ur5, rng):

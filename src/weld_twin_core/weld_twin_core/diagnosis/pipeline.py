@@ -154,9 +154,6 @@ def _explained(
     result = search(*examined.posed, exclude, beliefs, progress)
     result = fitted_together(result, exclude, beliefs, progress)
     result = settled_between(result, examined.given.may_change, beliefs)
-    examined = _without_slips(result, examined, exclude, beliefs, progress)
-    if examined.posed is None:
-        return refusal(examined)
     examined = examined.comparing_tools(result.problem, result.final.model)
     out = _conclude(result, examined, holdout, beliefs, limits, progress)
     # Where the answer that no name fits is itself probably right, the many are not tried.
@@ -167,22 +164,6 @@ def _explained(
     progress('nothing is named: the other way to explain it')
     instead = _conclude(other, examined, holdout, beliefs, limits, progress)
     return instead if _named(instead) else out
-
-
-def _without_slips(
-    result: Search,
-    examined: Examined,
-    exclude: Sequence[str],
-    beliefs: Beliefs,
-    progress: Progress,
-) -> Examined:
-    """Return what was examined, unsound where something gave way that no effect explains."""
-    out = examined.refusing_slips(result.problem, result.final.model)
-    if out.posed is None and exclude and examined.posed is not None:
-        # What was taken out of the library may be what looks like a slip.
-        whole = search(*examined.posed, (), beliefs, progress)
-        out = examined.refusing_slips(whole.problem, whole.final.model)
-    return out
 
 
 def _named(out: Diagnosis) -> bool:

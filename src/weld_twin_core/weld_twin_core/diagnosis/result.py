@@ -613,7 +613,7 @@ class Diagnosis:
             'statics': _statics(self.recordings),
             'tool': _frame(robot.T_flange_tool),
             'bases': [_frame(base) for base in self.model.bases],
-            'epochs_ns': [r.epoch_ns for r in self.recordings],
+            'epochs_ns': [r.clock_ns for r in self.recordings],
             'spans_ns': [list(r.span_ns) for r in self.recordings],
             'known': [effect.to_mapping() for effect in self.model.known],
             'found': [effect.to_mapping() for effect in self.model.found],

@@ -30,7 +30,7 @@ _T = TypeVar('_T', bound='_Timed')
 
 
 class _Timed(LinearEffect):
-    """A constant error times a share that hangs on the time, counted from the recording's epoch."""
+    """A constant error times a share that hangs on the time, on the clock of the (first) recording."""
 
     since: ClassVar[str] = 'time'
     """The option that is an instant [s]."""
@@ -77,7 +77,7 @@ class Sudden(_Timed):
     """The kind of constant that it is afterwards; None where it is one of its own all the time."""
 
     def share(self, view: View) -> Array:
-        return (view.t >= self.time).astype(np.float64)
+        return (view.dates >= self.time).astype(np.float64)
 
 
 @register
@@ -204,15 +204,16 @@ class SetupStep(_SetupMotion):
     )
 
     def share(self, view: View) -> Array:
-        return (view.t < self.time).astype(np.float64)
+        return (view.dates < self.time).astype(np.float64)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield steps at evenly spread samples, none at the very ends."""
-        index = np.linspace(0, view.t.size - 1, _TIMES + 2).round().astype(int)[1:-1]
+        t = view.dates
+        index = np.linspace(0, t.size - 1, _TIMES + 2).round().astype(int)[1:-1]
         for k in np.unique(index):
             if k > 0:
-                yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
+                yield cls(time=float(0.5 * (t[k - 1] + t[k])))
 
     def remedy(self, robot: Robot) -> str:
         before = self.with_vector(-self.vector())
@@ -245,7 +246,7 @@ class SetupSettling(_SetupMotion):
     since = 'start'
 
     def share(self, view: View) -> Array:
-        return np.exp(-np.maximum(view.t - self.start, 0.0) / self.time_constant)
+        return np.exp(-np.maximum(view.dates - self.start, 0.0) / self.time_constant)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
@@ -253,7 +254,7 @@ class SetupSettling(_SetupMotion):
         span = float(view.elapsed[-1])
         if span > 0.0:
             for share in (0.05, 0.12, 0.25, 0.5):
-                yield cls(time_constant=share * span, start=float(view.t[0]))
+                yield cls(time_constant=share * span, start=float(view.dates[0]))
 
     def remedy(self, robot: Robot) -> str:
         return (

@@ -191,6 +191,13 @@ class View:
     """The effort holds the load; else it is the load itself."""
     shift: Shift = field(default_factory=dict)
     """Channels displaced by the stages before."""
+    later: float = 0.0
+    """How much later the stamps are on the clock by which effects are dated [s]."""
+
+    @property
+    def dates(self) -> Array:
+        """Return when the samples were taken, on the clock by which effects are dated [s]."""
+        return self.t + self.later
 
     @cached_property
     def frames(self) -> Frames:

@@ -200,8 +200,20 @@ class Twin(EffectStages):
     ) -> View:
         """Return a motion at stamps with wrench, temperature and effort there."""
         motion, (wrench, temperature, effort) = recording.joints, sides
-        seen = self.robot, t, t - motion.t[0], q, qd, motion.static, wrench
-        return View(*seen, recording.wrench_frame, temperature, effort, recording.effort_holds)
+        return View(
+            self.robot,
+            t,
+            t - motion.t[0],
+            q,
+            qd,
+            motion.static,
+            wrench,
+            recording.wrench_frame,
+            temperature,
+            effort,
+            recording.effort_holds,
+            later=recording.later,
+        )
 
     def _sampled(
         self, recording: Recording, at: Array | None, want: bool

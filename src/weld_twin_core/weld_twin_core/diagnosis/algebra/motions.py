@@ -90,7 +90,9 @@ def together(features: Sequence[Features]) -> View:
     count = np.arange(float(sum(view.t.size for view in views)))
     static = all(view.static for view in views)
     loads = {at: np.concatenate([v.shift[at] for v in views]) for at in views[0].shift}
-    return replace(views[0], t=count, elapsed=count, static=static, shift=loads, **named)
+    return replace(
+        views[0], t=count, elapsed=count, later=0.0, static=static, shift=loads, **named
+    )
 
 
 def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:

@@ -13,10 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
 from ...effects.effect import Effect
-from ...recording import Recording
+from ...recording import Recording, on_one_clock
 from ..algebra.problem import ROWS, Model, Problem
 from ..beliefs import Beliefs
 from ..frames.aligned import aligned, tracked_part
@@ -27,7 +25,7 @@ from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Finding, mistake
 from .images import images
-from .limits import FEW, MOST
+from .limits import MOST
 from .mending import ONE, Given, as_entry
 from .mixups import mixups
 from .richness import motion, outliers, quantity, repeats
@@ -80,8 +78,7 @@ class Examined:
     unsound: tuple[Unsound, ...]
     mistakes: tuple[Finding, ...]  # those that were undone
     slips: tuple[Slip, ...] = ()
-    """What seems to have given way at an instant. Of one recording these are causes that ``posed``
-    offers the search; of several see `refusing_slips`."""
+    """What seems to have given way at an instant: causes that ``posed`` offers the search."""
 
     def unsound_with(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
@@ -89,30 +86,6 @@ class Examined:
         slips = (slip for slip in self.slips if slip.effect.key in kept)
         own = (_gave_way(slip, self.given).as_unsound(applied=True) for slip in slips)
         return (*self.unsound, *own)
-
-    def refusing_slips(self, problem: Problem, model: Model) -> Examined:
-        """
-        Return the same, unsound where something gave way in one of several recordings.
-
-        A slip counts one time for all recordings, so no search can weigh one of them against the
-        library. It is reported only where what the library explains best, ``model``, still leaves it:
-        loops of lost motion and play that the load turns over look like steps until they are fitted.
-        """
-        if len(problem.recordings) < 2 or not self.slips:
-            return self
-        remaining = Case(problem, model).slips
-        kept = [
-            one for one in self.slips if any(_same(one, other, problem) for other in remaining)
-        ]
-        if not kept:
-            return self
-        mistakes = [_gave_way(slip, problem) for slip in kept]
-        return replace(
-            self,
-            posed=None,
-            checks=(*_first(mistakes, applied=False), *self.checks),
-            unsound=(*self.unsound, *(m.as_unsound(applied=False) for m in mistakes)),
-        )
 
     def comparing_tools(self, problem: Problem, model: Model) -> Examined:
         """
@@ -153,6 +126,7 @@ def examine(
     apply: go on with mended data where every mistake can be undone.
     beliefs: what a difference between recordings must be worth.
     """
+    given = replace(given, recordings=on_one_clock(given.recordings))
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid
         look = _Look(mistakes=streams(trial))
@@ -197,9 +171,7 @@ class _Look(NamedTuple):
         """Return the problem with what gave way, and the model with what was undone."""
         if self.posed is None:
             return None
-        alone = len(self.posed[0].recordings) == 1
-        dated = tuple(slip.effect for slip in self.dated) if alone else ()
-        problem = replace(self.posed[0], dated=dated)
+        problem = replace(self.posed[0], dated=tuple(slip.effect for slip in self.dated))
         sentences = tuple(each.sentence for each in mistakes)
         made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
         return problem, replace(self.posed[1], mended=sentences, mends=made)
@@ -234,14 +206,7 @@ def _checked(problem: Problem, model: Model) -> _Look:
     return _Look((problem, model), tuple(out), [], tuple(case.slips))
 
 
-def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
-    """Return whether two steps of one recording are as near as one instant can be told."""
-    t = problem.recordings[slip.recording].seen.t
-    near = 2.0 * abs(slip.time - other.time) <= FEW * float(np.ptp(t))
-    return slip.recording == other.recording and near
-
-
 def _gave_way(slip: Slip, of: Given | Problem) -> Finding:
-    """Return the mistake that a slip is; of several recordings, effects count one time for all."""
+    """Return the mistake that a slip is."""
     sentence = slip.sentence(of.recordings[slip.recording])
     return mistake(sentence, slip.kind, (slip.effect.at,), slip.remedy, alike=slip.alike)

@@ -46,7 +46,7 @@ def setup(case: Case) -> Sequence[Finding]:
 
 def _moved(case: Case, step: Slip) -> str:
     recording = case.recordings[step.recording]
-    if step.time > recording.seen.t[0]:
+    if step.time(recording) > recording.seen.t[0]:
         return f'{step.sentence(recording)} {step.remedy}.'
     return (
         f'The set-up moved by {length(step.size)} before {recording.name}; have the base '

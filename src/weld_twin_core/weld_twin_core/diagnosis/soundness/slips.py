@@ -145,11 +145,17 @@ class Change:
     def best(self, shapes: Sequence[Array]) -> Array:
         return shapes[int(self.gains(np.array(shapes)).argmax())]
 
-    def step_gains(self, k: int) -> Array:
-        """Return the gain of a step before every sample of recording k, shape (M_k,)."""
+    def step_gains(self, k: int, after: NDArray[np.bool_]) -> Array:
+        """
+        Return the gain of a step before every sample of recording k, shape (M_k,).
+
+        after: samples of recordings that came later, shape (M,).
+        """
         mine = self.rest.recording == k
         # Sums over each sample and all later ones.
-        right, overlap, normal = (np.cumsum(t[mine][::-1], axis=0)[::-1] for t in self._terms)
+        right, overlap, normal = (
+            np.cumsum(t[mine][::-1], axis=0)[::-1] + t[after].sum(axis=0) for t in self._terms
+        )
         normal = normal - np.matmul(np.swapaxes(overlap, 1, 2), overlap)
         return np.asarray((right * _solved(right, normal)).sum(axis=1))
 
@@ -296,17 +302,16 @@ class Slip:
     def kind(self) -> str:
         return _WORDS[type(self.effect)][0]
 
-    @property
-    def time(self) -> float:
-        """Return when [s], between the last measurement before and the first after."""
-        return self.effect.time
+    def time(self, recording: Recording) -> float:
+        """Return when [s] by its recording's stamps, between the measurements before and after."""
+        return self.effect.time - recording.later
 
     @property
     def alike(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         return tuple((_WORDS[type(other)][0], (other.at,)) for other in self.others)
 
     def sentence(self, recording: Recording) -> str:
-        what, when = _WORDS[type(self.effect)][1], instant(recording, self.time)
+        what, when = _WORDS[type(self.effect)][1], instant(recording, self.time(recording))
         out = f'{what.format(self.effect.at)} at {when} of {recording.name}: the tool is '
         out += f'{length(self.size)} off then.'
         others = ' or '.join(_WORDS[type(other)][2].format(other.at) for other in self.others)
@@ -430,20 +435,21 @@ class _Seen:
             yield _Trial(change.log_bayes_factor(shape), change, shape, k, constant=constant)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
-        t = self.problem.recordings[k].seen.t
+        recording = self.problem.recordings[k]
+        t, after = recording.seen.t, self._after(recording)
         # At the ends of a recording a step cannot be told from the end's own troubles.
         edge = max(3, int(FEW * t.size / 2.0))
         allowed = np.zeros(t.size, dtype=bool)
         allowed[edge : t.size - edge] = True
-        for recording, at in self.taken:
-            if recording == k:
+        for other, at in self.taken:
+            if other == k:
                 allowed[max(at - edge, 0) : at + edge] = False
         for effect, change in self._kinds if allowed.any() else ():
-            at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
-            shape = self._in_recording((np.arange(t.size) >= at).astype(np.float64), k)
+            at = int(np.where(allowed, change.step_gains(k, after), -np.inf).argmax())
+            shape = self._in_recording((np.arange(t.size) >= at).astype(np.float64), k) + after
             # Every instant was asked; the best of many is better than it should be.
             log_bayes_factor = change.log_bayes_factor(shape) - float(np.log(t.size))
-            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[call-arg]
+            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0 + recording.later)  # type: ignore[call-arg]
             yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
     def named(self, smooth: _Trial) -> Iterator[Slip | Settling]:
@@ -464,8 +470,8 @@ class _Seen:
         if smooth.sure < MARGIN + max(steady, of_joints):
             return
         if smooth.constant == MOVED_BEFORE:  # of the first recording: before the second
-            start = float(self.problem.recordings[max(k, 1)].seen.t[0])
-            knock = InstrumentKnock(time=start)
+            moved = self.problem.recordings[max(k, 1)]
+            knock = InstrumentKnock(time=float(moved.seen.t[0]) + moved.later)
             yield Slip(knock, max(k, 1), size, smooth.sure, dated=False)
         else:
             yield Settling(k, late, size)
@@ -473,6 +479,12 @@ class _Seen:
     def _age(self, k: int) -> Array:
         t = self.problem.recordings[k].seen.t
         return np.asarray((t - t[0]) / max(float(np.ptp(t)), TINY))
+
+    def _after(self, recording: Recording) -> NDArray[np.bool_]:
+        """Return the samples of recordings that began later: what gave way stays so in them."""
+        starts = [float(r.joints.t[0]) + r.later for r in self.problem.recordings]
+        began = float(recording.joints.t[0]) + recording.later
+        return np.repeat(np.array(starts) > began, self.rest.samples)
 
     def _in_recording(self, shape: Array, k: int) -> Array:
         out = np.zeros(self.rest.recording.size)

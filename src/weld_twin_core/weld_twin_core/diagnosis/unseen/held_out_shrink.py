@@ -179,7 +179,7 @@ def _for_bag(
     choices = [
         Model(model.robot, (base,), model.known + model.changed(k), found)
         for k, (base, own) in enumerate(zip(model.bases, recordings, strict=True))
-        for found in ways_seen(model.found, own.epoch_ns, own.span_ns, recording)
+        for found in ways_seen(model.found, own.clock_ns, own.span_ns, recording)
     ]
     sizes = [_size(problem, choice) for choice in choices]
     best = choices[int(np.argmin(sizes))]

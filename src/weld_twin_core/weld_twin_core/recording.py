@@ -328,8 +328,6 @@ class Recording:
     """Shape (K,) [degC]."""
     epoch_ns: int = 0
     """What the stamps count from, [ns] since 1970."""
-    later: float = 0.0
-    """How much later its stamps are on the clock by which effects are dated [s]; see `on_one_clock`."""
     notes: tuple[str, ...] = ()
     """What a reader should know of it, in sentences."""
     incomplete: tuple[str, ...] = ()
@@ -348,6 +346,8 @@ class Recording:
     """What cameras saw, of which the measurements were made; see `bundle`."""
     counted: Counted | None = None
     """How the controller counts the joints, where it is known to count otherwise than the robot."""
+    later: float = 0.0
+    """How much later its stamps are on the clock by which effects are dated [s]; see `on_one_clock`."""
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:
@@ -509,14 +509,14 @@ def on_one_clock(recordings: Iterable[Recording]) -> tuple[Recording, ...]:
     Return recordings with their dates on one clock, that of the first.
 
     Stamps without a date tell of themselves alone: where such a recording begins before the one given
-    before it has ended, it is taken to follow it.
+    before it has ended, it is taken to follow it a second later.
     """
     out: list[Recording] = []
     for recording in recordings:
         if out and recording.dated and out[0].dated:
             later = (recording.epoch_ns - out[0].epoch_ns) * 1e-9
         else:
-            ended = out[-1].joints.t[-1] + out[-1].later if out else -np.inf
-            later = max(float(ended - recording.joints.t[0]), 0.0)
-        out.append(replace(recording, later=later))
+            free = out[-1].joints.t[-1] + out[-1].later + 1.0 if out else -np.inf
+            later = max(float(free - recording.joints.t[0]), 0.0)
+        out.append(replace(recording, later=later) if later != recording.later else recording)
     return tuple(out)

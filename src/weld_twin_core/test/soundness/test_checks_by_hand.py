@@ -328,7 +328,9 @@ def test_a_change_explains_what_was_put_in_and_nothing_once_it_is_taken_out(ur5,
     base, no_other = rest.change('base'), np.zeros(80, dtype=bool)
     assert int(base.step_gains(0, no_other).argmax()) == 50
     shapes = np.array([np.arange(80) >= k for k in (20, 50, 70)], dtype=float)
-    np.testing.assert_allclose(base.gains(shapes), base.step_gains(0, no_other)[[20, 50, 70]], rtol=1e-6)
+    np.testing.assert_allclose(
+        base.gains(shapes), base.step_gains(0, no_other)[[20, 50, 70]], rtol=1e-6
+    )
     assert base.size(after) == pytest.approx(1.5e-3, rel=0.05)
     assert base.log_bayes_factor(after) > 50.0
     left = base.taken_out(after)
@@ -345,7 +347,9 @@ def test_a_change_takes_off_what_least_squares_do_beside_frames_and_arm():
     columns, metres = rng.normal(size=(50, 6, 2)) * there[..., None], rng.normal(size=(50, 3, 2))
     rest = Rest(given.reshape(50, 6), basis, {'base': (columns, metres)}, rows, samples, 1e-4)
     change, steps = rest.change('base'), np.arange(50) >= np.arange(40, 50)[:, None]
-    np.testing.assert_allclose(change.step_gains(1, steps[0] & False), change.gains(steps * 1.0), rtol=1e-9)
+    np.testing.assert_allclose(
+        change.step_gains(1, steps[0] & False), change.gains(steps * 1.0), rtol=1e-9
+    )
     for shape in (rng.uniform(0.0, 1.0, 50), steps[4] * 1.0):
         every = np.concatenate([basis.T, (columns * shape[:, None, None]).reshape(300, 2)], axis=1)
         step = np.linalg.lstsq(every, given[0], rcond=None)[0]

@@ -126,7 +126,8 @@ def examine(
     apply: go on with mended data where every mistake can be undone.
     beliefs: what a difference between recordings must be worth.
     """
-    given = replace(given, recordings=on_one_clock(given.recordings))
+    if len(given.recordings) > 1:
+        given = replace(given, recordings=on_one_clock(given.recordings))
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid
         look = _Look(mistakes=streams(trial))

@@ -311,8 +311,10 @@ class Slip:
         return tuple((_WORDS[type(other)][0], (other.at,)) for other in self.others)
 
     def sentence(self, recording: Recording) -> str:
-        what, when = _WORDS[type(self.effect)][1], instant(recording, self.time(recording))
-        out = f'{what.format(self.effect.at)} at {when} of {recording.name}: the tool is '
+        what, time = _WORDS[type(self.effect)][1], self.time(recording)
+        inside = time > recording.seen.t[0]
+        when = f'at {instant(recording, time)} of' if inside else 'before'
+        out = f'{what.format(self.effect.at)} {when} {recording.name}: the tool is '
         out += f'{length(self.size)} off then.'
         others = ' or '.join(_WORDS[type(other)][2].format(other.at) for other in self.others)
         return f'{out} {others[0].upper()}{others[1:]} would look the same.' if others else out
@@ -429,9 +431,12 @@ class _Seen:
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
         shapes = self._shapes(k)
-        for _, change in self._kinds:
-            best = int(change.gains(np.array([shape for _, shape in shapes])).argmax())
-            constant, shape = shapes[best]
+        # What a joint did between recordings is a step.
+        within = [each for each in shapes if each[0] != MOVED_BEFORE]
+        for effect, change in self._kinds:
+            own = within if isinstance(effect, JointSlip) else shapes
+            best = int(change.gains(np.array([shape for _, shape in own])).argmax())
+            constant, shape = own[best]
             yield _Trial(change.log_bayes_factor(shape), change, shape, k, constant=constant)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
@@ -444,12 +449,20 @@ class _Seen:
         for other, at in self.taken:
             if other == k:
                 allowed[max(at - edge, 0) : at + edge] = False
-        for effect, change in self._kinds if allowed.any() else ():
-            at = int(np.where(allowed, change.step_gains(k, after), -np.inf).argmax())
+        # A base of its own takes up what moved before; another tool is for `parted` to tell.
+        before, began = self._before(recording), allowed.copy()
+        began[0] = before < t[0]
+        for effect, change in self._kinds:
+            may = began if isinstance(effect, JointSlip) else allowed
+            if not may.any():
+                continue
+            at = int(np.where(may, change.step_gains(k, after), -np.inf).argmax())
             shape = self._in_recording((np.arange(t.size) >= at).astype(np.float64), k) + after
             # Every instant was asked; the best of many is better than it should be.
-            log_bayes_factor = change.log_bayes_factor(shape) - float(np.log(t.size))
-            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0 + recording.later)  # type: ignore[call-arg]
+            asked = t.size if at else len(self.problem.recordings)
+            log_bayes_factor = change.log_bayes_factor(shape) - float(np.log(asked))
+            time = float((t[at - 1] if at else before) + t[at]) / 2.0 + recording.later
+            slip = replace(effect, time=time)  # type: ignore[call-arg]
             yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
     def named(self, smooth: _Trial) -> Iterator[Slip | Settling]:
@@ -479,6 +492,11 @@ class _Seen:
     def _age(self, k: int) -> Array:
         t = self.problem.recordings[k].seen.t
         return np.asarray((t - t[0]) / max(float(np.ptp(t)), TINY))
+
+    def _before(self, recording: Recording) -> float:
+        """Return when the last measurement before a recording was, by its stamps [s]; inf for none."""
+        ends = [float(r.seen.t[-1]) + r.later - recording.later for r in self.problem.recordings]
+        return max((end for end in ends if end < recording.seen.t[0]), default=np.inf)
 
     def _after(self, recording: Recording) -> NDArray[np.bool_]:
         """Return the samples of recordings that began later: what gave way stays so in them."""

@@ -102,10 +102,9 @@ class Search:
     """Whether many small errors were fitted together."""
     refused: tuple[Effect, ...] = ()
     """What would explain the rest best, but no machine has."""
-    few: Search | None = None
-    """Where many predict unseen data better: what was found one by one, if that was finished."""
-    many: Search | None = None
-    """All kinds fitted together, where that predicts about as well as the few do."""
+    other_way: Search | None = None
+    """Of a few effects and many small errors the way that was not chosen, where it may be told: the few
+    where the many name no cause; the many where the few leave the cause unknown."""
 
     @property
     def library(self) -> Library:

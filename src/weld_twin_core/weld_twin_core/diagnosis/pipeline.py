@@ -156,10 +156,12 @@ def _explained(
     result = settled_between(result, examined.given.may_change, beliefs)
     examined = examined.comparing_tools(result.problem, result.final.model)
     out = _conclude(result, examined, holdout, beliefs, limits, progress)
+    other = result.other_way
+    if other is None or _named(out):
+        return out
     # Where the answer that no name fits is itself probably right, the many are not tried.
     nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
-    other = result.few or (None if out.status != 'unknown' or nameless else result.many)
-    if other is None or _named(out):
+    if other.dense and (nameless or out.status != 'unknown'):
         return out
     progress('nothing is named: the other way to explain it')
     instead = _conclude(other, examined, holdout, beliefs, limits, progress)

@@ -68,8 +68,8 @@ def fitted_together(
     # Several that were chosen on the parts left out as well have their lead by that.
     chosen = several and _relearned(best)
     if not chance and (result.crowded or remaining < (1.0 if chosen else beliefs.better) * few):
-        return best if result.crowded else replace(best, few=result)
-    return replace(result, many=best) if remaining < CHOSEN * few else result
+        return best if result.crowded else replace(best, other_way=result)
+    return replace(result, other_way=best) if remaining < CHOSEN * few else result
 
 
 def _by_chance(few: Search, many: Search, before: float, remaining: float) -> bool:

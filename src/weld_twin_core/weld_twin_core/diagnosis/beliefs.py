@@ -19,7 +19,7 @@ class Beliefs:
     What a diagnosis believes before it sees data, as numbers.
 
     Each field says what it means, its unit, and where its value comes from. The numbers by which
-    data are refused as unsound lie in `soundness.limits`.
+    data are refused as unsound lie in `limits`.
 
     Examples
     --------

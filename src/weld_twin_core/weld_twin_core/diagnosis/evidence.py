@@ -22,11 +22,10 @@ from ..effects.effect import Effect
 from ..effects.plausible import beyond
 from ..effects.registry import REGISTRY
 from .algebra.fit import Fit, without_strays
-from .algebra.negligible import ROUNDING
-from .algebra.noise_floor import NANOMETRE
 from .algebra.problem import Problem, Scale, Site
 from .algebra.workspace import Library, Role, Workspace
 from .beliefs import Beliefs
+from .negligible import NANOMETRE, ROUNDING
 from .result import Family, Structure
 
 NAMED = 3

@@ -31,9 +31,8 @@ from ...recording import JointMotion, Measurements, Recording
 from ...twin.features import Features
 from ..algebra.fit import effect_precision, frame_prior
 from ..algebra.motions import plain_causes
-from ..algebra.negligible import FLAT, ROUNDING
-from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import PLACES, Model, Problem, Scale
+from ..negligible import FLAT, MICROMETRE, ROUNDING
 from .experiment import motion_entry
 from .postures import widened
 from .separation import Explanation

@@ -28,8 +28,8 @@ from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ...twin.features import with_expected_effort
 from ..algebra.fit import design, effect_precision, with_weights
-from ..algebra.negligible import REPEATED
 from ..algebra.problem import Model, Problem, Scale
+from ..negligible import REPEATED
 from .candidates import Candidate, Piece
 
 _ROWS = 1200

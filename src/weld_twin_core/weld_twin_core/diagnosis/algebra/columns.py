@@ -21,8 +21,8 @@ from ...arm.channels import Shift
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.features import Features
+from ..negligible import EMPTY, ROUNDING
 from .definite import Index, inverted, unit_diagonal, well_conditioned
-from .negligible import EMPTY, ROUNDING
 from .problem import Model, Problem, Scale
 
 Rows = slice | Index

@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs, dtrtri
 
 from ...arrays import Array
-from .negligible import EMPTY, FLAT
+from ..negligible import EMPTY, FLAT
 
 SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""

@@ -22,11 +22,10 @@ from scipy.linalg import LinAlgError
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.plausible import spreads
+from ..negligible import EMPTY, FLAT, NANOMETRE, REPEATED, ROUNDING, SLIGHT
 from .columns import Columns, designed
 from .definite import factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
-from .negligible import EMPTY, FLAT, REPEATED, ROUNDING, SLIGHT
-from .noise_floor import NANOMETRE
 from .problem import Model, Problem, Scale
 
 FRAME_SHIFT = 0.02

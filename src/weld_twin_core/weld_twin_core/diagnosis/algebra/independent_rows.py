@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from .negligible import EMPTY, SLIGHT
+from ..negligible import EMPTY, SLIGHT
 
 Row = TypeVar('Row', bound=np.generic)
 ENOUGH = 12

@@ -20,8 +20,8 @@ from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...errors import DataError
+from ..negligible import FLAT, REWEIGHTED, ROUNDING, SLIGHT
 from .definite import solved
-from .negligible import FLAT, REWEIGHTED, ROUNDING, SLIGHT
 
 JITTER = (ROUNDING, FLAT, SLIGHT, 1.0)
 """Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""

@@ -25,8 +25,8 @@ from ...effects.view import View
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
+from ..negligible import EMPTY, SLIGHT
 from .definite import outside, share_outside, span_of
-from .negligible import EMPTY, SLIGHT
 from .problem import LEVER, Site
 
 STILL = 0.04

@@ -12,10 +12,6 @@ from ...arrays import Array
 from .independent_rows import ENOUGH, measured_axes, robust_spread, visited
 from .problem import Problem
 
-NANOMETRE = 1e-9
-"""Least error [m] divided by, far below any instrument."""
-MICROMETRE = 1e-6
-"""Least error [m] that any instrument sees."""
 THIRD = 20.0
 """Variance of a third difference, 1 -3 3 -1, over that of what it is taken of."""
 WIDEST = 3.5e-4

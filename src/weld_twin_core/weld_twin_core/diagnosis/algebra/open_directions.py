@@ -16,8 +16,8 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from ..negligible import FLAT
 from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
-from .negligible import FLAT
 from .problem import ROWS, Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)

@@ -24,8 +24,8 @@ from ...pose_noise import Common
 from ...recording import Counted, Recording
 from ...twin.features import Features, Remembered
 from ...twin.twin import Twin
+from ..negligible import ROUNDING
 from .independent_rows import by_sample, effective_share, visited
-from .negligible import ROUNDING
 
 FRAMES = ('base', 'tool')
 ROWS = 9000

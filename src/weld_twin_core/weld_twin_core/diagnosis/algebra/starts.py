@@ -13,11 +13,11 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.stages import Picker
+from ..negligible import EMPTY, FLAT, ROUNDING
 from .columns import Maker, Piece, Rows, rows_of
 from .definite import outside, span_of
 from .fit import design
 from .motions import moved_most
-from .negligible import EMPTY, FLAT, ROUNDING
 from .problem import Model, Problem, Scale
 
 MEMORY = (Stage.SERVO, Stage.PLAY)

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
+from ..negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from .columns import Columns, designed
 from .definite import Index, unit_diagonal
 from .fit import Fit, design, fit, predict_fit
 from .independent_rows import FEWEST
-from .negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from .problem import Model, Problem, Scale, Site
 from .starts import started
 

@@ -15,7 +15,6 @@ from ...twin.posterior import Posterior
 from ..advice import Limits, actions
 from ..algebra.fit import trusted
 from ..algebra.motions import never_parted
-from ..algebra.negligible import EMPTY
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
@@ -26,6 +25,7 @@ from ..frames.changes import list_changes, list_undetectable
 from ..levels.causes import causes, contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
+from ..negligible import EMPTY
 from ..result import (
     Candidate,
     Cause,

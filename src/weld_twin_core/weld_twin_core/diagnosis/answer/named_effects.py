@@ -26,12 +26,12 @@ from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra.columns import BLOCKS, SHOWN, Columns, columns_covariance
 from ..algebra.fit import coordinates, trusted
-from ..algebra.negligible import EMPTY, SLIGHT
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import profile
 from ..evidence import Search, Verdict
 from ..frames.changes import columns_and_ridge
 from ..levels.causes import covering
+from ..negligible import EMPTY, SLIGHT
 from ..result import Cause, Found, Site
 from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen

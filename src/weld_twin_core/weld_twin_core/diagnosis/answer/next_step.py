@@ -21,12 +21,12 @@ from ..advice.postures import Limits, Room
 from ..advice.separation import Explanation
 from ..algebra.fit import fit
 from ..algebra.motions import narrow
-from ..algebra.negligible import FLAT
 from ..algebra.problem import ROWS, Scale
 from ..beliefs import CAUSES
 from ..evidence import LIKELIER, NAMED, Search, Verdict
 from ..levels.curved import Curved
 from ..levels.free_form import Part
+from ..negligible import FLAT
 from ..unseen.groups import Group
 
 _FORESEEN = 2.0

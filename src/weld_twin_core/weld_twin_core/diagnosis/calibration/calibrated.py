@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from ..algebra.negligible import ROUNDING
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, Evidence, Row, Verdict, marginal
+from ..negligible import ROUNDING
 from ..result import NAMING, Cause, Family
 from .features import (
     TOLD_AS,

@@ -31,8 +31,8 @@ import numpy as np
 from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
 from ..algebra.fit import FRAME_SHIFT, LEAST_NOISE, fit, robust_scale
-from ..algebra.negligible import REWEIGHTED, ROUNDING, SLIGHT
 from ..algebra.problem import ROWS, Model, Problem
+from ..negligible import REWEIGHTED, ROUNDING, SLIGHT
 
 LEVER = 0.1
 """Metres that a radian counts as here. Turns may be told in another convention, and then positions have

@@ -36,10 +36,10 @@ from ..algebra.fit import (
     with_weights,
 )
 from ..algebra.motions import constant, of_no_size
-from ..algebra.negligible import REPEATED, REWEIGHTED
 from ..algebra.problem import ROWS, Change, Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..evidence import Search
+from ..negligible import REPEATED, REWEIGHTED
 from ..result import Changed, Site
 
 SURE = 3.0

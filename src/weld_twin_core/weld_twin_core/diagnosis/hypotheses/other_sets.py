@@ -22,7 +22,6 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.definite import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
-from ..algebra.negligible import REPEATED
 from ..algebra.workspace import (
     Choice,
     Library,
@@ -35,6 +34,7 @@ from ..algebra.workspace import (
     ranking,
 )
 from ..beliefs import CAUSES, SHORTLIST
+from ..negligible import REPEATED
 from ..result import Site
 from .selection import ROUNDS, backward, implausible, sites
 

@@ -20,9 +20,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.negligible import EMPTY
 from ..beliefs import Beliefs
 from ..evidence import Left, Row, Search, Verdict, marginal
+from ..negligible import EMPTY
 from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import COVERED, jackknife, student
 from ..unseen.unseen_stretches import Unseen

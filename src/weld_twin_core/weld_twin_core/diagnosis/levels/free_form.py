@@ -15,10 +15,10 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.definite import factored
 from ..algebra.fit import Fit
-from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.problem import Problem, Scale
 from ..beliefs import CAUSES, SHORTLIST, Beliefs
 from ..evidence import LIKELIER, NAMED, marginal
+from ..negligible import EMPTY, FLAT
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import STRETCHES, steadiness, ways_to_divide
 from ..unseen.groups import Group, all_groups

@@ -33,10 +33,10 @@ from ...effects.plausible import beyond
 from ...recording import Recording
 from ...twin.features import Features
 from ..algebra.independent_rows import ENOUGH, measured_axes
-from ..algebra.negligible import EMPTY, FLAT
 from ..algebra.noise_floor import THIRD, NoiseFloor
 from ..beliefs import Beliefs
 from ..evidence import Evidence, Scatter, Search
+from ..negligible import EMPTY, FLAT
 from ..result import Family, Shrink, Site, Structure
 from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import STRETCHES, jackknife, ways_to_divide

@@ -20,10 +20,10 @@ from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
 from ..algebra.columns import MANY
-from ..algebra.negligible import EMPTY, ROUNDING
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..evidence import Search
+from ..negligible import EMPTY, ROUNDING
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import RIDGES, Unseen

@@ -40,9 +40,9 @@ from ..algebra.fit import (
 from ..algebra.independent_rows import FEWEST
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.motions import candidate_kinds, hardly_moves, lacking, moved_most, separable_orders
-from ..algebra.negligible import FLAT, HIDDEN
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
+from ..negligible import FLAT, HIDDEN
 from ..unseen.unseen_stretches import Unseen
 
 LINES = 40

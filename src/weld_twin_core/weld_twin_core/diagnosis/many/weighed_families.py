@@ -30,9 +30,9 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.motions import same_error
-from ..algebra.noise_floor import NANOMETRE
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, Search
+from ..negligible import NANOMETRE
 from ..result import Family, Site
 from ..unseen.folds import growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen

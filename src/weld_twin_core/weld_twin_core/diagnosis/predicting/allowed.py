@@ -40,11 +40,11 @@ from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.twin import Twin
 from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import LEAST_NOISE, PROBE, Fit
-from ..algebra.negligible import EMPTY, FLAT
-from ..algebra.noise_floor import MICROMETRE, NoiseFloor
+from ..algebra.noise_floor import NoiseFloor
 from ..algebra.open_directions import AXES, in_words, open_directions
 from ..algebra.problem import ROWS, Model, Problem, Scale
 from ..evidence import NAMED
+from ..negligible import EMPTY, FLAT, MICROMETRE
 from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen

@@ -25,9 +25,9 @@ from ...twin.goal_motion import just_turned
 from ..algebra.definite import unit_diagonal
 from ..algebra.fit import trusted
 from ..algebra.independent_rows import ENOUGH
-from ..algebra.negligible import EMPTY, REPEATED
-from ..algebra.noise_floor import NANOMETRE, NoiseFloor
+from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem
+from ..negligible import EMPTY, NANOMETRE, REPEATED
 from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen
 from .sizes import SIZES, Products

@@ -34,7 +34,7 @@ from scipy.linalg.lapack import dtrtrs
 from ...arrays import Array
 from ..algebra.definite import inverse_of, root_of
 from ..algebra.fit import NOISE_TRUST
-from ..algebra.negligible import EMPTY, HIDDEN, ROUNDING
+from ..negligible import EMPTY, HIDDEN, ROUNDING
 
 SIZES = np.array([0.0001, 0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 """Sizes of an error in units of what machines have: a ten-thousandth is none, for a thousandth of all of

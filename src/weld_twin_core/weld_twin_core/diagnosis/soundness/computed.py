@@ -19,9 +19,9 @@ from ..algebra.fit import effect_precision, fit
 from ..algebra.independent_rows import SAME_STATION, robust_spread
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
+from ..limits import CLEAR, COMPUTED, ENOUGH, MOVED, NOISE, SAMPLES, STEPS, UNEXPLAINED, WORTH
 from .evidence import Case, Finding, mistake, note
 from .lengths import distance, length, middle_of_each
-from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, NOISE, SAMPLES, STEPS, UNEXPLAINED, WORTH
 from .stamps import written
 
 SMOOTH = 2e-8

@@ -22,9 +22,9 @@ from ...effects.curves import AT_REST
 from ...errors import DataError
 from ...recording import Recording
 from ...twin.features import with_expected_effort
+from ..limits import CLEAR, FEW, SAMPLES
 from ..result import EffortCause, Efforts, JointEffort
 from .evidence import Case, Finding, note, warning
-from .limits import CLEAR, FEW, SAMPLES
 
 SHAPED = 1.0 - 2.0 * FEW
 """Correlation from which a joint's effort has the shape of its load, whatever the masses. A sign is

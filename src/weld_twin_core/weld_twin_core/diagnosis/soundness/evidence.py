@@ -16,10 +16,10 @@ from ...arrays import Array
 from ...recording import Recording
 from ..algebra.problem import ROWS, Model, Problem
 from ..frames.alignment import refined
+from ..limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from ..result import Unsound
 from .lag import Lag, lag
 from .lengths import distance, middle_of_each, swept
-from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Rest, Settling, Slip, changes, rest_of
 from .snapshot import Snapshot, snapshot

@@ -20,12 +20,12 @@ from ..beliefs import Beliefs
 from ..frames.aligned import aligned, tracked_part
 from ..frames.alignment import refined
 from ..frames.changes import with_changes
+from ..limits import MOST
 from ..result import Check, Unsound
 from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Finding, mistake
 from .images import images
-from .limits import MOST
 from .mending import ONE, Given, as_entry
 from .mixups import mixups
 from .richness import motion, outliers, quantity, repeats

@@ -22,8 +22,8 @@ from ...cameras.sightings import Fitted, located
 from ...errors import DataError
 from ..algebra.definite import outside, span_of
 from ..algebra.problem import ROWS
+from ..limits import ENOUGH, FEW, HALVED, STRAY, WORTH
 from .evidence import Case, Finding, mistake, note
-from .limits import ENOUGH, FEW, HALVED, STRAY, WORTH
 
 IMAGE_FAR = 1.5
 """Noise of a pixel [px] from which images are looked into. Corners of boards are found within 0.05 to

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...arm.rotation import nearest_rotation
 from ...arrays import Array, spread_over
-from .limits import ENOUGH, FEW, STEPS, WORTH
+from ..limits import ENOUGH, FEW, STEPS, WORTH
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""

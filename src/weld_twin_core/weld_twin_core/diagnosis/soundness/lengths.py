@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...recording import Recording
-from .limits import MOVED, RUN
+from ..limits import MOVED, RUN
 
 
 def distance(part: Array) -> Array:

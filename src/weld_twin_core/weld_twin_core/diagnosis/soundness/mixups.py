@@ -22,9 +22,9 @@ from ...effects.compliance import JointCompliance
 from ...effects.effect import Effect
 from ...effects.geometry import ChannelError, JointOffset, RootPose
 from ..algebra.problem import Model
+from ..limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .evidence import Case, Finding, mistake
 from .lengths import capital, distance, falls, length, listed
-from .limits import CLEAR, FEW, HALVED, LARGE, MOST, SHORTLIST, UNDONE, UNEXPLAINED, WIDER, WORTH
 from .mending import frames_fitted
 from .slips import Slip
 from .snapshot import KINDS, LENGTHS, Arm, Snapshot, of_joints, rough_models

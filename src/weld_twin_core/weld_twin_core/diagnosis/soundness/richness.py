@@ -19,9 +19,9 @@ from ...arrays import Array
 from ...errors import DataError
 from ...recording import Recording
 from ..algebra.open_directions import in_words, shown
+from ..limits import ENOUGH, FEW, MOVED, NOISE, RUN, STRAY, TINY
 from .evidence import Case, Finding, note, warning
 from .lengths import length, listed
-from .limits import ENOUGH, FEW, MOVED, NOISE, RUN, STRAY, TINY
 
 TWO_ARMS = 12
 """Turning joints from which a chain holds two arms: of six each. An arm on a gantry that welds on a

@@ -21,9 +21,9 @@ from scipy.spatial.distance import cdist
 from ...arrays import Array
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
+from ..limits import CLEAR, FAR, FEW, RUN, UNEXPLAINED
 from .evidence import Case, Finding, mistake
 from .lengths import distance, listed
-from .limits import CLEAR, FAR, FEW, RUN, UNEXPLAINED
 from .mending import repaired
 from .snapshot import rough_models, snapshot
 

@@ -22,9 +22,9 @@ from ...effects.dated import InstrumentKnock
 from ...effects.geometry import ToolPose
 from ...twin.compensation import TORCH
 from ..algebra.problem import Change, Model
+from ..limits import CLEAR, FEW, HALVED, NOISE, PARTED, TILTED, WRONG
 from .evidence import Case, Finding, mistake, note, warning
 from .lengths import capital, falls, length, listed, middle_of_each
-from .limits import CLEAR, FEW, HALVED, NOISE, PARTED, TILTED, WRONG
 from .mending import differing
 from .slips import TAKEN_UP, Settling, Slip
 from .snapshot import Arm, Snapshot

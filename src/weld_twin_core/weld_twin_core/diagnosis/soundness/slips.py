@@ -33,9 +33,9 @@ from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.motions import moved_most, plain_causes
 from ..algebra.problem import Model, Problem, Scale
+from ..limits import FEW, MARGIN, MOST, TINY, WIDER
 from .lag import KEPT
 from .lengths import instant, length
-from .limits import FEW, MARGIN, MOST, TINY, WIDER
 
 LASTING = ('constant', 'angle', 'direction', 'speed', 'acceleration', 'load', 'temperature')
 """What errors of an arm depend on that are no change in time."""

@@ -30,8 +30,8 @@ from ...recording import JointMotion, Recording
 from ..algebra.fit import effect_precision, fit, robust_scale
 from ..algebra.problem import Anchor, Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
+from ..limits import CLEAR, ENOUGH, FAR, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
 from .lengths import distance, middle_of_each, swept
-from .limits import CLEAR, ENOUGH, FAR, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
 from .mending import Given, Mend
 
 FRAMES = frozenset({'base', 'tool'})

@@ -18,10 +18,10 @@ from ...recording import Recording
 from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned
+from ..limits import CLEAR, ENOUGH, FEW, HALVED, LATE, MOVED, NOISE, TINY, WORTH
 from .evidence import Case, Finding, mistake, note, warning
 from .lag import KEPT, Lag
 from .lengths import falls, listed
-from .limits import CLEAR, ENOUGH, FEW, HALVED, LATE, MOVED, NOISE, TINY, WORTH
 from .mending import Given, Mend, stamped_evenly, stamps_as, velocities_left_out
 
 

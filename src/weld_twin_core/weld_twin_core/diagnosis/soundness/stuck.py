@@ -15,9 +15,9 @@ from ...recording import JointMotion, Recording
 from ...twin.features import Features
 from ..algebra.problem import ROWS, Model
 from ..frames.alignment import refined
+from ..limits import CLEAR, ENOUGH, FEW, LATE, MOST, RUN, SOUND
 from .evidence import Case, Finding, mistake
 from .lengths import distance, length
-from .limits import CLEAR, ENOUGH, FEW, LATE, MOST, RUN, SOUND
 
 REMEDY = 'See to the driver that publishes the joint states, and measure again'
 

@@ -23,11 +23,12 @@ from ...recording import Recording
 from ..algebra.fit import robust_fit
 from ..algebra.independent_rows import robust_spread
 from ..algebra.motions import plain_causes
+from ..algebra.posed import FEWEST
 from ..algebra.problem import ROWS, Model, Problem
-from ..frames.aligned import FEWEST, aligned
+from ..frames.aligned import aligned
+from ..limits import CLEAR, FEW, LARGE, RUN, STRAY, TINY, UNDONE, WORTH
 from ..result import Unsound
 from .evidence import Finding, mistake
-from .limits import CLEAR, FEW, LARGE, RUN, STRAY, TINY, UNDONE, WORTH
 
 SUREST = 1e-6
 """Noise [m] below which none is told from less: no instrument and no socket is better."""

@@ -23,8 +23,8 @@ import numpy as np
 
 from ...arrays import Array
 from ..algebra.definite import Index, unit_diagonal
-from ..algebra.negligible import EMPTY, FLAT, REPEATED
 from ..algebra.noise_floor import spread_of
+from ..negligible import EMPTY, FLAT, REPEATED
 
 DRAWS = 100
 """Drawings of noise. What none of them reaches noise reaches once in a hundred times."""

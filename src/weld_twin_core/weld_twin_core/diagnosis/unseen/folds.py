@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ...arrays import Array
-from ..algebra.negligible import EMPTY
-from ..algebra.noise_floor import NANOMETRE
 from ..algebra.problem import PLACES, Problem
+from ..negligible import EMPTY, NANOMETRE
 
 STRETCHES = 8
 """Folds in time: enough for a standard error, few enough that each shows much."""

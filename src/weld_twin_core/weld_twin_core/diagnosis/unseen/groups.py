@@ -28,8 +28,8 @@ from ...effects.effect import Effect
 from ...twin.features import Features
 from ...twin.stages import Picker
 from ..algebra.independent_rows import ENOUGH
-from ..algebra.negligible import FLAT, ROUNDING
 from ..algebra.problem import Model, Problem, Scale
+from ..negligible import FLAT, ROUNDING
 from .folds import STRETCHES
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}

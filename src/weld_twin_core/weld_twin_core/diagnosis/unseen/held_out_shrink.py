@@ -15,11 +15,11 @@ from ...effects.dated import ways_seen
 from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.independent_rows import FEWEST
-from ..algebra.negligible import EMPTY
+from ..algebra.posed import by_place, posed
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import CAUSES, Beliefs
 from ..evidence import Search
-from ..frames.aligned import by_place, posed
+from ..negligible import EMPTY
 from ..result import Shrink
 from .folds import STRETCHES, jackknife, posture_regions, student
 from .unseen_stretches import Unseen

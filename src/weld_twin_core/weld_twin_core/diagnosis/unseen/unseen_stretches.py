@@ -28,9 +28,9 @@ from ...arrays import Array
 from ..algebra.columns import MANY, Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
 from ..algebra.fit import Fit, frame_prior, trusted
-from ..algebra.negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.starts import chosen_anew
+from ..negligible import EMPTY, FLAT, REPEATED, ROUNDING
 from .folds import STRETCHES, Gain, gain, growth, parts_of, ways_to_divide
 
 RIDGES = (1e-2, 1.0, 1e2, 1e4)

@@ -14,11 +14,10 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ..algebra.fit import Fit, trusted
-from ..algebra.negligible import EMPTY, ROUNDING
-from ..algebra.noise_floor import MICROMETRE
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
 from ..evidence import NAMED, Search
+from ..negligible import EMPTY, MICROMETRE, ROUNDING
 from ..result import Cause, Structure, Where
 from .chance import Candidates, chance_gain, may_be_chance
 from .folds import Gain

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..algebra.noise_floor import MICROMETRE
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, CandidateSet, Evidence, Left, Verdict, named_together
+from ..negligible import MICROMETRE
 from ..result import Family, Site
 
 LISTED = 8

@@ -17,3 +17,7 @@ REWEIGHTED = 15
 HIDDEN = 0.05
 """Part of what an error does to the tool that fitted frames must leave of it for it to be told from
 them: formulas are a few per cent off real arms, so that less says nothing of the error."""
+NANOMETRE = 1e-9
+"""Least error [m] divided by, far below any instrument."""
+MICROMETRE = 1e-6
+"""Least error [m] that any instrument sees."""

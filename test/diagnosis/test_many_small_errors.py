@@ -219,3 +219,20 @@ def test_two_kinds_that_show_only_together_are_chosen_together(size, chosen):
     case = _Case(load('ur5'), frozenset(), effects, (view,), parts, worth=0.1)
     assert case.chosen() == chosen
     assert max(np.median(case.growth([k], [])) for k in (0, 1)) < 0.1
+
+
+@pytest.mark.parametrize(
+    ('losses', 'least', 'most'),
+    [
+        ([0.0, 0.01, 0.0, 0.02, 0.0, 0.0, 0.01, 0.0], 0.99, 1.0),
+        ([0.14, 0.15, 0.16, 0.15, 0.14, 0.16, 0.15, 0.15], 0.0, 0.01),
+        ([0.23, 0.42, 0.14, 0.02, 0.0, 0.07, 0.3, 0.17], 0.1, 0.5),
+        ([0.15], 0.0, 0.5),
+    ],
+)
+def test_a_kind_is_told_from_another_only_where_the_parts_agree(monkeypatch, losses, least, most):
+    """Where the other leaves half a tenth more than a tenth in the median part, but not in every."""
+    monkeypatch.setattr(_Case, 'growth', lambda case, kept, less: np.array(losses))
+    effects = tuple(effect(kind, joint='elbow_joint') for kind in ('link_length', 'link_twist'))
+    case = _Case(load('ur5'), frozenset(), effects, (), np.zeros(1, dtype=int), worth=0.1)
+    assert least <= case._does_as_well([1], [0]) <= most

@@ -333,9 +333,14 @@ def test_families_of_which_none_is_needed_leave_the_cause_unknown():
     assert 'takes the place' in verdict.reasons[1]
 
 
-@pytest.mark.parametrize(('size', 'count'), [(1.1e-6, 1), (0.9e-6, 0)])
-def test_a_member_that_moves_the_tool_by_less_than_a_micrometre_is_nobodys_concern(size, count):
-    assert len(of_families(family('link_length', size=size)).families) == count
+@pytest.mark.parametrize(
+    ('size', 'rms', 'count'), [(1.1e-6, 3e-5, 1), (0.9e-6, 0.9e-6, 0), (0.9e-6, 3e-5, 1)]
+)
+def test_a_kind_is_told_where_the_fit_of_all_has_a_micrometre_of_it_or_unseen_data_miss_it(
+    size, rms, count
+):
+    families = of_families(family('link_length', rms=rms, size=size)).families
+    assert [one.named for one in families] == [True] * count
 
 
 def test_families_are_told_largest_first_and_what_they_account_for():

@@ -171,7 +171,7 @@ class Family:
     needed: tuple[tuple[Site, float], ...] = ()
     """The members without which unseen data get worse, each with its share of the kind."""
     like: tuple[tuple[Site, float], ...] = ()
-    """What would do nearly as well in its place, and how nearly: 1 is as well."""
+    """What may do as well in its place, to a tenth of what is left, and how probable that is."""
     share: float = 0.0
     """Share of the squared unseen gap that it takes off; all that are chosen add up to what they
     take off together."""

@@ -31,7 +31,7 @@ from ..algebra.starts import profile
 from ..evidence import Search, Verdict
 from ..frames.changes import columns_and_ridge
 from ..levels.causes import covering
-from ..negligible import EMPTY, SLIGHT
+from ..negligible import EMPTY, MICROMETRE, SLIGHT
 from ..result import Cause, Found, Site
 from ..unseen.folds import COVERED
 from ..unseen.unseen_stretches import Unseen
@@ -42,7 +42,8 @@ def named_effects(
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
     """Return the reported effects, those that move the tool most first, with verdict and causes."""
     model = result.final.model
-    named = _named_sets(model.found, verdict, causes, dense=result.dense)
+    moves = [unseen.rms(target) > MICROMETRE for target in unseen.targets[1:]]
+    named = _named_sets(model.found, verdict, causes, moves if result.dense else None)
     squares = (unseen.targets[1:] ** 2).sum(axis=1)
     named.sort(key=lambda pair: -squares[pair[0]])
     if not named:
@@ -60,14 +61,28 @@ def named_effects(
 
 
 def _named_sets(
-    model: Sequence[Effect], verdict: Verdict, causes: Sequence[Cause], *, dense: bool
+    model: Sequence[Effect],
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    moves: Sequence[bool] | None,
 ) -> list[tuple[int, int]]:
-    """Return which effects of the model are reported, each with the number of its set."""
-    if not dense:
+    """
+    Return which effects of the model are reported, each with the number of its set.
+
+    Of a set of many small errors it is the first; where the fit of all kinds has put all of it into
+    another of the set, that one.
+
+    moves: which effects of the model move the tool at all, where many were fitted together.
+    """
+    if moves is None:
         return [(c.members[0], c.effect) for c in causes if c.effect is not None]
     sites = [Site.of(effect) for effect in model]
-    pairs = ((group[0], k) for k, group in enumerate(verdict.sets) if group)
-    return [(sites.index(site), k) for site, k in pairs if site in sites]
+    out = []
+    for k, group in enumerate(verdict.sets):
+        members = [sites.index(site) for site in group if site in sites]
+        if members:
+            out.append((next((m for m in members if moves[m]), members[0]), k))
+    return out
 
 
 def standard_errors(

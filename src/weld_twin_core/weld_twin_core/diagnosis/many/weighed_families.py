@@ -9,7 +9,8 @@ least on unseen data first, until no other takes a tenth off. Kinds that resembl
 only together, as wrong lengths and twists do: where none takes enough off by itself, two may. A kind
 that not every arm has is one of them only where unseen data get worse without it beside all that every
 arm has. Each is then taken out of what was chosen, with all others and the frames fitted anew: a kind
-is needed where unseen data get worse. What would do as well in its place is reported beside it.
+is needed where unseen data get worse. What may do as well in its place is reported beside it: of few
+stations the parts differ, and a kind is told from another only where they agree.
 
 Of kinds that are each likelier wrong than right, as they take each other's place, one of them may be
 right beyond much doubt: two or three of them are one set, if unseen data bear that out.
@@ -25,6 +26,7 @@ from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtr
 
 from ...arm.robot import Robot
 from ...arrays import Array
@@ -32,7 +34,7 @@ from ...effects.effect import Effect
 from ..algebra.motions import same_error
 from ..beliefs import Beliefs
 from ..evidence import LIKELIER, Search
-from ..negligible import NANOMETRE
+from ..negligible import EMPTY, NANOMETRE
 from ..result import Family, Site
 from ..unseen.folds import growth, means, parts_of
 from ..unseen.unseen_stretches import Unseen
@@ -281,13 +283,25 @@ class _Case:
         like = []
         for other, instead in self.members.items():
             if other not in chosen and self.named(other):
-                loss = max(self._loss(every, [*others, *instead]), 0.0)
-                if (part := 1.0 - loss / self.worth) > 0.0:
+                part = self._does_as_well([*others, *instead], every)
+                # What not every arm has is told only where it is likelier than not.
+                if self._in_every_arm(other) or part > LIKELIER:
                     like.append((part, instead))
         like = sorted(like, key=lambda item: -item[0])[:MOST_LIKE]
         reported = tuple((self._largest(others, instead), part) for part, instead in like)
         needed, alike = self._needed(others, own)
         return replace(out, needed=needed, alike=alike, like=reported)
+
+    def _does_as_well(self, other: Iterable[int], kept: Iterable[int]) -> float:
+        """
+        Return how probable it is that a model leaves no more than another by what a kind is worth.
+
+        By how far the parts left out agree on it.
+        """
+        loss = self.growth(kept, other)
+        error = float(loss.std(ddof=1)) / np.sqrt(loss.size) if loss.size > 1 else np.inf
+        room = self.worth - max(float(np.median(loss)), 0.0)
+        return float(stdtr(max(loss.size - 1, 1), room / max(error, EMPTY)))
 
     def together(self, group: Sequence[Family], chosen: Sequence[Family]) -> Family:
         """Return some kinds as one set: what they account for together, and the largest before all."""

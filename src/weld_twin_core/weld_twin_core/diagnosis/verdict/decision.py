@@ -141,6 +141,9 @@ def _of_families(remaining: Left) -> Verdict:
     families = []
     for family in remaining.evidence.families or ():
         members = tuple(item for item in family.members if item[1] > MICROMETRE)
+        if not members and family.chosen and family.rms_m > MICROMETRE:
+            # The fit of all kinds has put into others what unseen data need of this one.
+            members = family.members
         if members:
             # Joints at which it is the same error count together.
             needed = tuple(

@@ -11,10 +11,11 @@ from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, recorded, si
 from weld_twin_core import Beliefs, Twin, diagnose, load
 from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.evidence import Evidence
+from weld_twin_core.diagnosis.answer.named_effects import _named_sets
+from weld_twin_core.diagnosis.evidence import Evidence, Verdict
 from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import _Case, weighed_families
-from weld_twin_core.diagnosis.result import Structure
+from weld_twin_core.diagnosis.result import Site, Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import decide
 
@@ -236,3 +237,13 @@ def test_a_kind_is_told_from_another_only_where_the_parts_agree(monkeypatch, los
     effects = tuple(effect(kind, joint='elbow_joint') for kind in ('link_length', 'link_twist'))
     case = _Case(load('ur5'), frozenset(), effects, (), np.zeros(1, dtype=int), worth=0.1)
     assert least <= case._does_as_well([1], [0]) <= most
+
+
+@pytest.mark.parametrize(
+    ('moves', 'reported'), [((True, True), 0), ((False, True), 1), ((False, False), 0)]
+)
+def test_of_a_set_that_member_is_reported_which_the_fit_of_all_kinds_has(moves, reported):
+    kinds = ('joint_offset', 'joint_compliance')
+    model = tuple(effect(kind, joint='elbow_joint') for kind in kinds)
+    verdict = Verdict('ambiguous', (tuple(Site(kind, 'elbow_joint') for kind in kinds),))
+    assert _named_sets(model, verdict, (), moves) == [(reported, 0)]

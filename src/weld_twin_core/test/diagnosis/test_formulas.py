@@ -12,16 +12,16 @@ NOISE = 2e-5
 CENTRE = np.array([0.3, -1.2, 1.4])
 
 
-def swinging() -> wt.JointMotion:
+def swinging(step: float) -> wt.JointMotion:
     """Return joints that swing at frequencies of their own, within the arm's limits."""
-    t = np.arange(0.0, 12.0, 0.02)
+    t = np.arange(0.0, 12.0, step)
     way = 0.5 * np.sin(np.outer(t, 0.7 + 0.31 * np.arange(3)) + np.arange(3))
     return wt.JointMotion(t, CENTRE + way)
 
 
-def recorded(bend=None, instrument=None) -> wt.Recording:
+def recorded(bend=None, instrument=None, step=0.04) -> wt.Recording:
     """Return a recording with one joint, or the instrument, bent by a function."""
-    commanded = swinging()
+    commanded = swinging(step)
     q = np.array(commanded.q)
     if bend is not None:
         q[:, ELBOW] += bend(q[:, ELBOW])
@@ -61,7 +61,7 @@ def first(found):
 
 
 def test_an_instrument_that_errs_by_a_law_of_its_own_is_no_scale():
-    found = wt.diagnose(recorded(instrument=far_off), small_arm(), experiment=False)
+    found = wt.diagnose(recorded(instrument=far_off, step=0.02), small_arm(), experiment=False)
     assert found.status == 'unknown'
     assert first(found) == ('instrument', 'place')
     assert not found.effects

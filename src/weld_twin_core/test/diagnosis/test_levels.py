@@ -23,10 +23,10 @@ NOISE = 2e-5
 ELBOW = 2
 
 
-def motion(seconds: float, seed: int, n: int = 3) -> wt.JointMotion:
+def motion(seconds: float, seed: int, n: int = 3, step: float = 0.04) -> wt.JointMotion:
     """Return joints that swing at frequencies of their own, within the arm's limits."""
     rng = np.random.default_rng(seed)
-    t = np.arange(0.0, seconds, 0.02)
+    t = np.arange(0.0, seconds, step)
     waves = [
         (rng.uniform(0.3, 0.9), rng.uniform(0.05, 0.3), rng.uniform(0.0, 6.0)) for _ in range(n)
     ]
@@ -35,10 +35,10 @@ def motion(seconds: float, seed: int, n: int = 3) -> wt.JointMotion:
     return wt.JointMotion(t, q)
 
 
-def recorded(bend, seed: int = 3, seconds: float = 40.0, robot=None) -> wt.Recording:
+def recorded(bend, seed=3, seconds=40.0, robot=None, step=0.04) -> wt.Recording:
     """Return a recording of an arm whose elbow is bent by a function of its angle."""
     robot = robot or small_arm()
-    commanded = motion(seconds, seed, robot.n)
+    commanded = motion(seconds, seed, robot.n, step)
     q = np.array(commanded.q)
     q[:, ELBOW] += bend(q[:, ELBOW])
     real = wt.Twin(robot).poses(wt.Recording('bent', wt.JointMotion(commanded.t, q)))
@@ -220,7 +220,7 @@ def test_what_stood_in_for_two_goes_once_both_are_there():
 
 def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
     robot = wt.load('ur5')  # three joints can do what the instrument does
-    recording = recorded(lambda angle: 0.0 * angle, seconds=8.0, robot=robot)
+    recording = recorded(lambda angle: 0.0 * angle, seconds=8.0, robot=robot, step=0.02)
     measured = recording.measured
     stretched = wt.Measurements(measured.t[::2], 1.0004 * measured.position[::2])
     told = wt.diagnose(

@@ -163,7 +163,7 @@ def recordings():
 @pytest.fixture(scope='module')
 def swung():
     """Return a recording of the arm in motion."""
-    t = np.arange(0.0, 8.0, 0.02)
+    t = np.arange(0.0, 8.0, 0.04)
     q = 0.4 * np.sin(np.outer(t, 0.5 + 0.2 * np.arange(6)) + np.arange(6))
     return measured('swing', t, q, static=False, rng=np.random.default_rng(5))
 

@@ -66,7 +66,7 @@ def test_an_excluded_error_that_is_no_twin_is_not_told():
 
 
 def swinging(robot, effects, noise=NOISE, home=(0.0, -1.2, 1.4, -1.0, -1.5, 0.0), moved=1.0):
-    t = np.arange(0.0, 12.0, 0.02)
+    t = np.arange(0.0, 12.0, 0.04)
     way = 0.4 * moved * np.sin(np.outer(t, 0.9 + 0.31 * np.arange(robot.n)))
     q = np.array(home[: robot.n]) + way
     commanded = wt.Recording('swing', wt.JointMotion(t, q))
@@ -116,7 +116,7 @@ PLAY = wt.effects.Backlash('joint_a3', width=6e-4)
 @pytest.fixture(scope='module')
 def cell():
     robot = wt.load('kuka_kr6_r900')
-    plan = wt.plan(robot, wt.default_seam(robot, 'weave'), 'aggressive', rate_hz=50.0, fit=True)
+    plan = wt.plan(robot, wt.default_seam(robot, 'weave'), 'aggressive', rate_hz=25.0, fit=True)
     seam = wt.Recording('seam', plan.motion)
     noise = np.random.default_rng(3).normal(scale=FINE, size=(plan.motion.t.size, 3))
     real = wt.Twin(robot, [LAG, ZERO, PLAY]).poses(seam).position + noise

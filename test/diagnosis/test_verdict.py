@@ -147,21 +147,8 @@ def test_arbitrary_base_and_tool_frames_are_found_and_the_cause_with_them():
     assert answer.shrink.rms_after_m == pytest.approx(FLOOR, rel=0.1)
 
 
-def made_up(**changes):
-    t = np.arange(100) / 10.0
-    motion = JointMotion(t, np.zeros((100, 6)))
-    return replace(Recording('odd', motion, Measurements(t, np.zeros((100, 3)))), **changes)
-
-
 @pytest.mark.parametrize('measured', [None, Measurements(np.zeros(0), np.zeros((0, 3)))])
 def test_a_recording_without_measurements_is_refused_by_name(measured):
+    recording = Recording('odd', JointMotion(np.arange(9.0), np.zeros((9, 6))), measured)
     with pytest.raises(DataError, match='odd holds no measured poses or points'):
-        diagnose([made_up(measured=measured)], load('ur5'), experiment=False)
-
-
-def test_clocks_that_do_not_overlap_are_unsound_with_both_spans():
-    late = Measurements(1000.0 + np.arange(50) / 10.0, np.zeros((50, 3)))
-    answer = diagnose([made_up(measured=late)], load('ur5'), experiment=False)
-    (item,) = answer.unsound
-    assert answer.status == 'unsound' and item.kind == 'clock'
-    assert '0.000 to 9.900 s against 1000.000 to 1004.900 s' in item.sentence
+        diagnose([recording], load('ur5'), experiment=False)

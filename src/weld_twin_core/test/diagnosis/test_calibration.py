@@ -191,7 +191,7 @@ def test_waves_of_which_the_slowest_is_seen_in_part_are_any_smooth_curve():
 def play():
     """Return a robot, and a recording of it with play in its elbow."""
     robot = wt.load('ur5')
-    plan = wt.plan(robot, wt.default_seam(robot, 'spline'), 'aggressive', rate_hz=50.0)
+    plan = wt.plan(robot, wt.default_seam(robot, 'spline'), 'aggressive', rate_hz=25.0)
     commanded = wt.Recording('seam', plan.motion)
     real = wt.Twin(robot, [wt.effects.Backlash('elbow_joint', width=5e-4)]).poses(commanded)
     noise = np.random.default_rng(7).normal(scale=2e-5, size=real.position.shape)

@@ -109,22 +109,6 @@ def test_only_constant_errors_may_change(robot):
         wt.diagnose([day(robot, 1), day(robot, 2)], robot, may_change='backlash', experiment=False)
 
 
-def test_a_whole_diagnosis(robot):
-    """The common errors are the verdict, the change stands beside them."""
-    pair = [day(robot, 1), day(robot, 2, JointOffset('elbow_joint', 1e-3))]
-    rest = [name for name in REGISTRY if name not in ('joint_offset', 'link_twist')]
-    found = wt.diagnose(
-        pair, robot, exclude=rest, may_change='joint_offset, tool_pose', experiment=False
-    )
-    assert {(f.effect.name, f.effect.site) for f in found.effects} == {
-        (e.name, e.site) for e in COMMON
-    }
-    (entry,) = found.as_dict()['changed']
-    assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
-    assert entry['value'] == pytest.approx(1e-3, abs=5e-5)
-    assert 0.0 < entry['std'] < 5e-5
-
-
 def test_a_change_shows_once_the_play_that_hid_it_is_found(robot):
     """What differs is asked for again after the search: before it, play is larger than a change."""
     play, anew = Backlash('shoulder_lift_joint', 5e-3), JointOffset('elbow_joint', 3e-4)

@@ -73,7 +73,7 @@ NOISE = 2e-5
 
 def seen_from(robot, real, path='spline'):
     """A seam along which the tool hardly turns, measured on an arm that is ``real``."""
-    plan = wt.plan(robot, wt.default_seam(robot, path), 'aggressive', rate_hz=50.0)
+    plan = wt.plan(robot, wt.default_seam(robot, path), 'aggressive', rate_hz=25.0)
     commanded = wt.Recording('seam', plan.motion)
     play = wt.effects.Backlash('elbow_joint', width=5e-4)
     poses = wt.Twin(real, [play]).poses(commanded)

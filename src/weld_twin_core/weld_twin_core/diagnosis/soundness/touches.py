@@ -45,11 +45,11 @@ class Touched(NamedTuple):
 
 def touches(problem: Problem, model: Model) -> Touched:
     """Return contacts as they are, and what was wrong with how they were called."""
-    plain = _plain_fit(problem, model)
+    plain = _fitted(problem, _with_plain_causes(problem, model))
     # The noise of an instrument and that of contacts are told from each other in turn.
     for _ in range(0 if problem.untracked else 2):
         problem = replace(problem, loose=_loose(problem, problem.residuals(plain)))
-        plain = _plain_fit(problem, plain.with_found(()))
+        plain = _fitted(problem, plain)
     rows = problem.residuals(plain)
     every = {
         k: _Postures(r, plain.twin(k).poses(r, r.joints.t).position)
@@ -71,13 +71,16 @@ def touches(problem: Problem, model: Model) -> Touched:
     return Touched(again, start, reported)
 
 
-def _plain_fit(problem: Problem, model: Model) -> Model:
-    """Return the model with all constant errors and springs fitted, outliers with little weight."""
-    problem = problem.thinned(ROWS)
+def _with_plain_causes(problem: Problem, model: Model) -> Model:
+    """Return the model with all constant errors and springs, of no size yet."""
     view = problem.features(model)[0].view
     every = plain_causes(model.robot, view, ('constant', 'load'))
-    start = model.with_found((*model.found, *every))
-    return robust_fit(problem, start)[0].model
+    return model.with_found((*model.found, *every))
+
+
+def _fitted(problem: Problem, model: Model) -> Model:
+    """Return the model fitted, outliers with little weight."""
+    return robust_fit(problem.thinned(ROWS), model)[0].model
 
 
 def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:

@@ -306,16 +306,16 @@ def _prior(what: Directions, model: Model, *, many: bool) -> Prior:
     gives = np.full(what.gives, gears.size)
     curves = gears.size + springs + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
-    others = gears.size + springs + len(sizes)
+    family = np.repeat([0, 1, 2], [gears.size + springs, len(sizes), int(not many)])
     if not many:
-        group[plausible_arm.named(effects, model.found) & (group >= 0)] = others
+        group[plausible_arm.named(effects, model.found) & (group >= 0)] = family.size - 1
     return Prior(
         np.concatenate([np.zeros(frames), tied, np.zeros(what.shapes)]),
         plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
-        np.concatenate([gears, np.ones(springs + len(sizes), bool), [False]]),
-        np.concatenate([np.zeros(gears.size + springs, bool), np.ones(len(sizes), bool), [False]]),
-        np.arange(others + 1) == others,
+        np.concatenate([gears, np.ones(springs + len(sizes), bool), family[family == 2] == 0]),
+        family == 1,
+        family == 2,
     )
 
 

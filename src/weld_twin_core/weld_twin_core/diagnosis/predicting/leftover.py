@@ -141,7 +141,7 @@ class Predicted:
     @cached_property
     def swept(self) -> Array:
         """Return how fast the tool moved, shape (N, 6) [m/s, rad/s]."""
-        return np.einsum('nki,kn->ki', self.levers, self.speeds)
+        return np.asarray(np.einsum('nki,kn->ki', self.levers, self.speeds))
 
     def axes(self, part: slice, swings: float) -> tuple[Array, Array, Array, Array]:
         """Return errors (K, c), moments (K, c, c), levers (K, c, n), velocities; swings count."""

@@ -3,7 +3,7 @@
 """The verdict in two sentences: the cause, and what knowing it brings."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 from weld_twin_core.diagnosis.verdict.decision import NO_GAP, UNEVEN
@@ -95,16 +95,21 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
             return f'{first}; each is as sure as its card says.', _gain(diagnosis)
         return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
     words = f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
+    share = share_by_site(diagnosis)
+    largest = max(diagnosis.effects, key=lambda each: share.get(site_of(each), 0.0))
     first = (
         f'The {size} comes from {len(names)} errors together, mostly '
-        f'{_families(diagnosis)}; the largest is {names[0]} {words}.'
+        f'{_families(diagnosis, share)}; the largest is {effect_name(largest)} {words}.'
     )
     return first, _gain(diagnosis)
 
 
-def _families(diagnosis: Diagnosis) -> str:
-    counts = Counter(result.effect.name for result in diagnosis.effects)
-    return listed([f'{called(name)} ({n})' for name, n in counts.most_common(2)])
+def _families(diagnosis: Diagnosis, share: Mapping[Site, float]) -> str:
+    """Return the two kinds that do most of the gap, with how many there are of each."""
+    each = [(result.effect.name, share.get(site_of(result), 0.0)) for result in diagnosis.effects]
+    counts = Counter(name for name, _ in each)
+    most = sorted(counts, key=lambda kind: -sum(part for name, part in each if name == kind))
+    return listed([f'{called(kind)} ({counts[kind]})' for kind in most[:2]])
 
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -82,6 +82,15 @@ def test_every_effect_of_the_library_has_a_name_in_words():
     assert titled == set(REGISTRY) - {'measurement_noise'}
 
 
+def test_of_many_errors_the_ones_that_do_most_of_the_gap_are_told_in_front():
+    told = diagnoses.calibration()
+    *others, last = told.causes
+    largest = (*(replace(each, share=0.01) for each in others), replace(last, share=0.6))
+    name = cause(told.effects[-1].effect.name, None)
+    first = plain(verdict(replace(told, causes=largest))[0])
+    assert f'mostly {name} (1) and ' in first and f'the largest is {name} (' in first
+
+
 def test_what_may_be_the_instrument_or_the_robot_is_not_told_to_be_noise():
     told = diagnoses.nothing()
     assert verdict(told)[1] == 'As far as these data reach, the model is the robot.'

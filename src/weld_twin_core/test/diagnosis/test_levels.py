@@ -258,6 +258,21 @@ def test_how_a_set_up_moved_is_no_cause_of_its_own():
     assert [site.effect for site, _ in cause.name] == ['frame_curve']
 
 
+def test_a_set_up_that_hardly_moved_is_told_of_no_gap():
+    """A zero swings as the hall does; a step of the base takes up a little of what its curve misses."""
+
+    def swinging(robot, commanded):
+        q = np.array(commanded.joints.q)
+        q[:, 2] += 6e-4 * np.sin(2.0 * np.pi * commanded.joints.t / 1200.0)
+        there = wt.JointMotion(commanded.joints.t, q, static=True)
+        return wt.Twin(robot).poses(wt.Recording('real', there)).position
+
+    found = at_stations('ur5', 4, swinging)
+    assert any(effect.traits.of_setup for effect in found.model.found)
+    (cause,) = found.causes
+    assert cause.place[0][0] == 'elbow_joint' and cause.dependence[0][0] == 'time'
+
+
 def test_a_base_that_leans_to_one_side_alone_is_no_instrument():
     def leaning(robot, commanded):
         # About x the base gives only where the arm pulls it to its left.

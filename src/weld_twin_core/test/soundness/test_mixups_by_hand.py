@@ -320,16 +320,31 @@ def test_a_small_step_of_the_set_up_is_warned_of_and_one_of_a_joint_is_not(ur5, 
     assert found.sentence.startswith('The set-up moved by 0.2 mm before run')
 
 
-def test_a_tool_that_was_hit_between_two_days_shows_beside_a_spring_once_that_is_found():
+SPRUNG = JointCompliance('shoulder_lift_joint', 4e-5)
+HIT = ToolPose((4e-4, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def of_days(**days):
+    """Return what is told of a UR5 with a spring, of 40 stations a day; days say what it has besides."""
     robot, rng = catalog.load('ur5'), np.random.default_rng(3)
-    spring = JointCompliance('shoulder_lift_joint', 4e-5)
-    hit = ToolPose((4e-4, 0.0, 0.0), (0.0, 0.0, 0.0))
-    days = [
-        recorded(robot, stations(robot, rng, 40), rng, effects, name=name)
-        for name, effects in (('one', [spring]), ('two', [spring, hit]))
+    runs = [
+        recorded(robot, stations(robot, rng, 40), rng, [SPRUNG, *more], name=name)
+        for name, more in days.items()
     ]
-    told = diagnose(days, robot, align='base,tool', experiment=False)
-    assert told.effects[0].effect.key == spring.key
-    (check,) = (one for one in told.checks if one.name == 'tools')
-    assert check.level == 'warning'
+    told = diagnose(runs, robot, align='base,tool', experiment=False)
+    assert told.effects[0].effect.key == SPRUNG.key
+    return told, [one for one in told.checks if one.name == 'tools']
+
+
+def test_a_tool_that_was_hit_between_two_days_is_a_cause_beside_a_spring():
+    told, checks = of_days(one=[], two=[HIT])
+    slip = told.effects[1].effect
+    assert slip.name == 'tool_slip' and not checks
+    np.testing.assert_allclose(slip.xyz, HIT.xyz, atol=3e-5)
+    assert told.unsound[0].sentence.endswith('before two: the tool is 0.392 mm off then.')
+
+
+def test_a_tool_that_was_another_on_one_day_shows_beside_a_spring_once_that_is_found():
+    told, (check,) = of_days(one=[], two=[HIT], three=[])
+    assert len(told.effects) == 1 and check.level == 'warning'
     assert 'of two sits elsewhere than that of one: 0.39' in check.sentence

@@ -199,16 +199,26 @@ def test_of_several_recordings_those_after_it_have_what_gave_way(ur5, rng, epoch
     np.testing.assert_allclose(named.xyz, entry['xyz'], atol=1e-4)
 
 
-def test_a_joint_that_slipped_between_two_recordings_is_told_with_the_later_one(ur5, rng):
-    slipped = effects_from_list([{**SLIPS['joint_slipped'], 'time': -1.0}], ur5)
+@pytest.mark.parametrize(
+    ('kind', 'words'),
+    [
+        ('joint_slipped', "Joint 'elbow_joint' slipped before later: "),
+        (
+            'reflector_jumped',
+            'The reflector jumped in its nest, or the tool in its holder before ',
+        ),
+    ],
+)
+def test_what_gave_way_between_two_recordings_is_told_with_the_later_one(ur5, rng, kind, words):
+    slipped = effects_from_list([{**SLIPS[kind], 'time': -1.0}], ur5)
     runs = [
         recorded(ur5, stations(ur5, rng), rng, effects, name=name)
         for name, effects in (('before', ()), ('later', slipped))
     ]
     found = examine(Given(tuple(runs), ur5, frozenset({'base', 'tool'})))
     (slip,), (before, later) = found.slips, found.given.recordings
-    assert (slip.kind, slip.effect.site) == ('joint_slipped', 'elbow_joint')
-    assert slip.sentence(later).startswith("Joint 'elbow_joint' slipped before later: ")
+    assert (slip.kind, slip.effect.name) == (kind, SLIPS[kind]['effect'])
+    assert slip.sentence(later).startswith(words)
     assert before.joints.t[-1] <= slip.effect.time <= later.joints.t[0] + later.later
 
 

@@ -61,11 +61,11 @@ def causes(
     labels = unseen.trusted_labels()
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
-    given = np.array([claim.share for claim in claims])
-    if result.dense:
-        claims, whole, spread = _beside_set_up(claims, whole, spread, left.beliefs.unexplained)
-    else:
+    if not result.dense:
+        given = np.array([claim.share for claim in claims])
         whole, spread = _as_placed(whole, spread, given, placing)
+    told, whole = _beside_set_up(result, claims, whole, left.beliefs.unexplained)
+    claims, whole, spread = [claims[k] for k in told], whole[told], spread[told]
     beside = 1.0 - float(whole.sum())
     noise = min(left.evidence.floor**2 / max(float(squares[0].mean()), EMPTY), beside)
     if not (left.above_noise or left.wide or len(named) < len(result.candidate_sets)):
@@ -87,19 +87,27 @@ def causes(
 
 
 def _beside_set_up(
-    claims: Sequence[Cause], whole: Array, spread: Array, least: float
-) -> tuple[list[Cause], Array, Array]:
+    result: Search, claims: Sequence[Cause], whole: Array, least: float
+) -> tuple[list[int], Array]:
     """
-    Return claims of many small errors with shares of the whole gap.
+    Return which claims are told, and the shares of all of the whole gap.
 
-    Kinds have shares of what the set-up's motion leaves. A motion of no more than the least share is
-    none: it may be what the laws of the kinds do not quite follow.
+    Kinds of many small errors have shares of what the set-up's motion leaves. A motion of no more than
+    the least share is none: it may be what the others do not quite follow.
     """
-    given = np.array([claim.share for claim in claims])
-    moved = np.isnan(given)
-    whole = np.where(moved, whole, given * (1.0 - float(whole[moved].sum())))
-    told = ~moved | (whole > least)
-    return [c for c, one in zip(claims, told, strict=True) if one], whole[told], spread[told]
+    found = result.final.model.found
+    if result.dense:
+        given = np.array([claim.share for claim in claims])
+        beside = float(whole[np.isnan(given)].sum())
+        whole = np.where(np.isnan(given), whole, given * (1.0 - beside))
+    told = (s > least or not _of_set_up(found, c) for c, s in zip(claims, whole, strict=True))
+    return [k for k, one in enumerate(told) if one], whole
+
+
+def _of_set_up(found: Sequence[Effect], claim: Cause) -> bool:
+    """Return whether a claim is how the set-up moved, which is no cause by name."""
+    own = [found[k].traits for k in claim.members]
+    return bool(own) and all(each.of_setup and not each.cause for each in own)
 
 
 def _cause(

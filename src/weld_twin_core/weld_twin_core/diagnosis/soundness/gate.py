@@ -91,7 +91,8 @@ class Examined:
         """
         Return the same, the tools of several recordings compared once more.
 
-        Beside the gap that a spring makes another tool hardly shows: ``model`` has it explained.
+        Beside the gap that a spring makes another tool hardly shows: ``model`` has it explained. A
+        tool that slipped is in the model, and is told as a cause.
         """
         if problem.touched:
             return self
@@ -100,7 +101,8 @@ class Examined:
             Check('tools', 'warning', f'{each.sentence} {each.remedy}'.strip())
             for each in parted(Case(problem, known))
         ]
-        if not told:
+        slipped = any(each.traits.dated and each.at == 'tool' for each in model.found)
+        if not told and not slipped:
             return self
         return replace(self, checks=(*told, *(c for c in self.checks if c.name != 'tools')))
 

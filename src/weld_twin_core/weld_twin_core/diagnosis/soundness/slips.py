@@ -431,10 +431,10 @@ class _Seen:
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
         shapes = self._shapes(k)
-        # What a joint did between recordings is a step.
+        # What a joint or the tool did between recordings is a step.
         within = [each for each in shapes if each[0] != MOVED_BEFORE]
         for effect, change in self._kinds:
-            own = within if isinstance(effect, JointSlip) else shapes
+            own = shapes if isinstance(effect, InstrumentKnock) else within
             best = int(change.gains(np.array([shape for _, shape in own])).argmax())
             constant, shape = own[best]
             yield _Trial(change.log_bayes_factor(shape), change, shape, k, constant=constant)
@@ -449,11 +449,11 @@ class _Seen:
         for other, at in self.taken:
             if other == k:
                 allowed[max(at - edge, 0) : at + edge] = False
-        # A base of its own takes up what moved before; another tool is for `parted` to tell.
+        # A base of its own takes up what moved before.
         before, began = self._before(recording), allowed.copy()
         began[0] = before < t[0]
         for effect, change in self._kinds:
-            may = began if isinstance(effect, JointSlip) else allowed
+            may = allowed if isinstance(effect, InstrumentKnock) else began
             if not may.any():
                 continue
             at = int(np.where(may, change.step_gains(k, after), -np.inf).argmax())

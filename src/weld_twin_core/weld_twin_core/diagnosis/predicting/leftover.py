@@ -14,11 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
+from scipy.special import chdtr, chdtri
 
 from ...arrays import Array, spread_over
 from ...twin.goal_motion import just_turned
@@ -75,6 +76,7 @@ class Predicted:
     """In which what was predicted may be off, each of one standard deviation, shape (R, N, 6);
     (R, N, 3) of points."""
     levers: Array  # d pose / d joint, shape (n, N, 6)
+    speeds: Array  # of the joints, shape (N, n) [rad/s or m/s]
     shaken: Array  # how hard joints were accelerated just before, shape (N, n) [rad/s^2 or m/s^2]
     seen: NDArray[np.bool_]  # rows that a sample has, shape (N, 6)
     region: NDArray[np.int_]  # which region of posture it lies in, shape (N,)
@@ -93,7 +95,7 @@ class Predicted:
         columns: Array,
         parts: Sequence[Products],
         levers: Array,
-        shaken: Array,
+        joints: tuple[Array, Array],
         given: Given,
         whole: tuple[Array, Array],
     ) -> Predicted:
@@ -102,6 +104,7 @@ class Predicted:
 
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
         parts: the columns' products in every region of posture, left out in turn.
+        joints: how fast they were, and how hard accelerated just before, each (N, n).
         whole: mean and covariance of the coordinates given all rows.
         """
         error, ways = unseen.whole, _by_others(unseen, columns, parts, given)
@@ -126,7 +129,7 @@ class Predicted:
             by_sample(error),
             by_sample(ways, wide),
             by_sample(levers),
-            shaken,
+            *joints,
             seen,
             labels[np.flatnonzero(place[1] == 0)].astype(int),
             good,
@@ -135,8 +138,13 @@ class Predicted:
             by_sample(own, wide),
         )
 
-    def axes(self, part: slice, swings: float) -> tuple[Array, Array, Array]:
-        """Return errors (K, c), moments (K, c, c) and levers (K, c, n), swings accounted for."""
+    @cached_property
+    def swept(self) -> Array:
+        """Return how fast the tool moved, shape (N, 6) [m/s, rad/s]."""
+        return np.asarray(np.einsum('nki,kn->ki', self.levers, self.speeds))
+
+    def axes(self, part: slice, swings: float) -> tuple[Array, Array, Array, Array]:
+        """Return errors (K, c), moments (K, c, c), levers (K, c, n), velocities; swings count."""
         some = self.good & self.seen[:, part].all(axis=1)
         left, levers = self.left[some, part], self.levers[:, some, part]
         moved = levers.transpose(1, 2, 0) * (swings * self.shaken[some])[:, None]
@@ -144,7 +152,7 @@ class Predicted:
         if self.at_rest:
             own = self.own[:, some, part]
             moments = np.einsum('rki,rkj->kij', own, own, optimize=True)
-        return left, moments, levers.transpose(1, 2, 0)
+        return left, moments, levers.transpose(1, 2, 0), self.swept[some, part]
 
 
 def _by_others(unseen: Unseen, columns: Array, parts: Sequence[Products], given: Given) -> Array:
@@ -203,17 +211,18 @@ def leftover(
         spread = _shared(*predicted.axes(slice(0, 3), swings), turning)
     else:
         # Faces and lengths show one way each: nothing parts what is left by axes or gears.
-        error, moment, _ = predicted.axes(slice(0, 1), swings)
+        error, moment, *_ = predicted.axes(slice(0, 1), swings)
         remaining = max(float((error**2).mean() - moment.mean()), 0.0)
         spread = Spread(float(np.sqrt(remaining)), np.zeros(lost.size), False)
-    error, moment, lever = predicted.axes(slice(3, 6), swings)
+    error, moment, lever, _ = predicted.axes(slice(3, 6), swings)
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     orientation = spread.position
     if error.size:
         moved = lever * spread.gears
         orientation = _size(error, moment + np.einsum('kin,kjn->kij', moved, moved), np.eye(3))
     common = _in_common(problem, predicted)
-    share = _of_the_arm(spread.position**2, common, noise, rough, problem.at_rest)
+    beside = _open(predicted) / max(spread.position**2, NANOMETRE**2)
+    share = _of_the_arm(spread.position**2, common, noise, rough, beside, problem.at_rest)
     of_gears = 1.0 if spread.surely else share
     at_turns = _at_turns(problem, predicted, lost)
     return Rest(
@@ -234,6 +243,8 @@ def _swings(predicted: Predicted) -> float:
     An arm swings on springs that no law of the model has, where it starts, stops and turns a corner, and
     errs little in between. What samples leave is held against how far a joint's swing would move the
     tool there: the slope is the variance. What the middle of the models followed is no less of the arm.
+    Stamps that jitter are off by more the faster the tool moves, which is the instrument's: that is
+    taken off both.
     """
     use = predicted.good & predicted.seen[:, :3].all(axis=1)
     moved = predicted.levers[:, use, :3] * predicted.shaken[use].T[:, :, None]
@@ -242,9 +253,12 @@ def _swings(predicted: Predicted) -> float:
         return 0.0
     own = predicted.own[:, use, :3]
     left = (predicted.left[use, :3] ** 2 + np.einsum('rki,rki->ki', own, own)).mean(axis=1)
-    apart = far - far.mean()
-    slope = float(apart @ left / (apart @ apart))
-    rest = left - left.mean() - slope * apart
+    fast = (predicted.swept[use, :3] ** 2).sum(axis=1)
+    beside = np.stack([np.ones_like(fast), fast / max(float(fast.max()), EMPTY)], axis=1)
+    both = np.stack([far, left], axis=1)
+    apart, rest = (both - beside @ np.linalg.lstsq(beside, both, rcond=None)[0]).T
+    slope = float(apart @ rest / (apart @ apart))
+    rest -= slope * apart
     chance = float(np.sqrt(apart**2 @ rest**2) / (apart @ apart))
     return float(np.sqrt(slope)) if slope > AGREED * chance else 0.0
 
@@ -300,21 +314,60 @@ def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
     return just_turned(recording.joints, recording.seen.t)
 
 
+def _open(predicted: Predicted) -> float:
+    """Return the variance that open directions leave of a coordinate [m^2]."""
+    seen = predicted.seen[:, :3] & predicted.good[:, None]
+    return float((predicted.own[:, :, :3] ** 2).sum(axis=0)[seen].mean())
+
+
 def _of_the_arm(
-    remaining: float, common: float, noise: float | None, rough: float, at_rest: bool
+    remaining: float,
+    common: float,
+    noise: float | None,
+    rough: float,
+    beside: float,
+    at_rest: bool,
 ) -> float:
     """
     Return the part of what is left over that is the arm's, as a factor of its size.
 
     remaining, common: variance [m^2], and the share of it that neighbours have in common.
-    noise: standard deviation of the instrument [m]; None where nothing tells it.
+    noise: standard deviation of the instrument [m]; None where nothing tells it. Then all is the arm's
+    as probably as it is rough, or nothing.
+    beside: variance that open directions leave, in that of what is left over.
     """
     alone = 1.0 - common
     if noise is None:
-        common += alone * min(rough / ROUGH, 1.0)
+        surely = min(rough / ROUGH, 1.0)
+        common += _holding(
+            np.array([0.0, alone]), np.array([1.0 - surely, surely]), beside + common
+        )
     elif at_rest:
         common += max(alone - noise**2 / max(remaining, EMPTY), 0.0)
     return float(np.sqrt(common))
+
+
+def _holding(variances: Array, likely: Array, beside: float) -> float:
+    """
+    Return the variance with which regions hold as many errors as they shall, of some that are likely.
+
+    Their mean would be that of the few largest, which hardly any arm has: a promise of nine in ten is
+    kept by less where they are rare, and by more where they are not.
+
+    beside: variance of what is on top in any case.
+    """
+    limit = float(chdtri(3, 1.0 - COVERED))
+
+    def held(variance: float) -> float:
+        return float(likely @ chdtr(3, limit * (beside + variance) / (beside + variances + EMPTY)))
+
+    low, high = 0.0, float(variances.max())
+    if held(low) >= COVERED:
+        return low
+    for _ in range(STEPS):
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if held(middle) >= COVERED else (middle, high)
+    return high
 
 
 class Spread(NamedTuple):
@@ -325,20 +378,26 @@ class Spread(NamedTuple):
     surely: bool
 
 
-def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bool_]) -> Spread:
+def _shared(
+    errors: Array, moments: Array, levers: Array, swept: Array, turning: NDArray[np.bool_]
+) -> Spread:
     """
     Return what is left over as the likeliest mixture of what is alike in all directions and of gears.
 
     Of all gears alike, or of one alone. An instrument is less sure along some directions than along
-    others, and these stay where they are; levers turn with the arm.
+    others, and these stay where they are; levers turn with the arm. Stamps that jitter are off along
+    the way, and more the faster the tool moves.
     """
     few = spread_over(len(errors), MOST)
-    errors, moments, levers = errors[few], moments[few], levers[few]
+    errors, moments, levers, swept = errors[few], moments[few], levers[few], swept[few]
     best = (-np.inf, 0.0, np.zeros(turning.size))
     singles = np.eye(turning.size)[turning]
     cost = np.log(max(len(singles), 1)) + LONE
-    for gears, price in ((turning * 1.0, 0.0), *((one, cost) for one in singles)):
-        moved = levers * gears
+    joints = [
+        (levers * gears, gears, price)
+        for gears, price in ((turning * 1.0, 0.0), *((one, cost) for one in singles))
+    ]
+    for moved, gears, price in (*joints, (swept[..., None], np.zeros(turning.size), 0.0)):
         lever = np.einsum('kin,kjn->kij', moved, moved)
         reach = max(float(np.trace(lever, axis1=1, axis2=2).mean()) / 3, EMPTY)
         for share in SHARES if reach > EMPTY else SHARES[:1]:

@@ -638,3 +638,28 @@ def test_a_program_for_the_arm_of_a_later_recording_is_corrected_by_what_changed
     assert correcting.program_model(robot, file).effects == ()
     (own,) = correcting.program_model(robot, file, setup=1).effects
     assert own.to_mapping() == {**slipped, 'offset': 5e-4}
+
+
+def test_a_torch_that_was_hit_is_told_as_left_out_of_a_program_with_another_tool(tmp_path):
+    """Its tool was fitted, so that no program has it to the digit; the hit was told as a cause."""
+    robot, rng, t = wt.load('ur5'), np.random.default_rng(5), 10.0 * np.arange(40.0)
+    q = np.array([0.0, -1.4, 1.5, -1.5, -1.4, 0.3]) + rng.uniform(-0.7, 0.7, (40, 6))
+    tip = np.eye(4)
+    tip[:3, 3] = 0.03, 0.0, 0.15
+    torch = robot.with_frames(tool=tip)
+    hit = wt.effects.ToolSlip(xyz=(1.2e-3, -8e-4, 5e-4), time=195.0)
+    stations = wt.Recording('stations', wt.JointMotion(t, q, static=True))
+    seen = wt.Twin(torch, [hit]).poses(stations).position + rng.normal(scale=3e-5, size=(40, 3))
+    head = ','.join(['time', *robot.joint_names, 'x [m]', 'y [m]', 'z [m]'])
+    rows = [','.join(f'{v:.8f}' for v in row) for row in np.column_stack([t, q, seen])]
+    (tmp_path / 'cell.csv').write_text('\n'.join([head, *rows]))
+    asked = ('--robot', 'ur5', '--align', 'base,tool', '--angle-unit', 'rad')
+    done('diagnose', tmp_path / 'cell.csv', *asked, '--out', tmp_path / 'found')
+    program = tmp_path / 'seam.script'
+    moves = [f'  movej([{", ".join(f"{v:.5f}" for v in row)}])' for row in q[:3]]
+    head = ['def seam():', '  set_tcp(p[0.03,0,0.15,0,0,0])']
+    program.write_text('\n'.join([*head, *moves, 'end', '']))
+    out, model = tmp_path / 'out', tmp_path / 'found' / 'diagnosis.json'
+    weld_twin('correct', program, '--robot', 'ur5', '--model', model, '--out', out)
+    notes = json.loads((out / 'correction.json').read_text())['notes']
+    assert any('what was found of the tool was left out' in note for note in notes)

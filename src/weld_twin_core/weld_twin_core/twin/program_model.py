@@ -44,6 +44,8 @@ class ProgramModel:
     """On the tool meanwhile, in ``wrench_frame``, shape (6,) [N, N m]."""
     wrench_frame: str = 'tool'
     """'tool' or 'base'."""
+    beside_frames: frozenset[str] = frozenset()
+    """Errors of frames that were found beside those fitted: what slipped since, or changed."""
     _twins: dict[tuple[bytes, bool], Twin] = field(default_factory=dict, repr=False)
 
     @property

@@ -114,8 +114,11 @@ def arm_model(robot: Robot, path: Path | str, setup: int = 0) -> ProgramModel:
     result, posterior = from_now_on(model.found), read_posterior(robot, path)
     if posterior is not None:
         result, posterior = posterior.of_the_arm().centred(result, setup)
-    effects = (*from_now_on(model.known), *result, *model.changed(setup))
-    return ProgramModel(placed, effects, posterior, setup=setup)
+    changed = model.changed(setup)
+    effects = (*from_now_on(model.known), *result, *changed)
+    found = (*from_now_on(model.found), *changed)
+    beside = frozenset(effect.name for effect in found if effect.traits.fitted_with)
+    return ProgramModel(placed, effects, posterior, setup=setup, beside_frames=beside)
 
 
 def _refuse_by_effort(effects: Sequence[Effect], path: Path | str) -> None:
@@ -198,6 +201,7 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
     ]
     fitted = model.posterior.directions.frames if model.posterior else ()
     errors = {effect.name for effect in model.effects if effect.traits.fitted_with not in fitted}
+    errors |= model.beside_frames
     if 'tool_pose' in errors and not all(model.same_tool(tool) for tool in tools):
         out.append(TOOL_LEFT)
     if 'base_pose' in errors:

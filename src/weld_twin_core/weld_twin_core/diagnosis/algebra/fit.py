@@ -154,7 +154,7 @@ def fit(
         # weigh less than a belief.
         start = start.believing((LEAST_NOISE / scale.position) ** 2)
         other = _descended(start, columns, iterations, tolerance, most)
-        here = min(here, other, key=lambda one: one.surprise)
+        here = min(here, other, key=lambda one: one.surprise(of_machines=precision is None))
     return Fit(here.model, here.residual)
 
 
@@ -260,13 +260,21 @@ class _Point:
     def believed(self) -> float:
         return float(self.ridge @ self.x**2) / self.share
 
-    @property
-    def surprise(self) -> float:
-        """Return twice the negative log probability of the fit, whatever the noise."""
+    def surprise(self, *, of_machines: bool) -> float:
+        """
+        Return twice the negative log probability of the fit, whatever the noise.
+
+        of_machines: sizes come as often as in machines, see `Fit.sized`; else they are normal.
+        """
         size, freedom = self.residual.size, max(self.residual.size - self.ridge.size, 1)
         least = size * (LEAST_NOISE / self.scale.position) ** 2
         rss = max(float(self.residual @ self.residual), least)
-        return freedom * float(np.log(rss)) + self.believed
+        misfit = freedom * float(np.log(rss))
+        if not of_machines:
+            return misfit + self.believed
+        far = self.ridge * self.x**2 / self.share
+        frames = self.x.size - self.prior.size
+        return misfit + float(far[:frames].sum() + 2.0 * np.log1p(far[frames:]).sum())
 
 
 def solve_scaled(normal: Array, right: Array, damping: float) -> Array:

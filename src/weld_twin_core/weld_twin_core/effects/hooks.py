@@ -374,3 +374,16 @@ def highest_order(q: Array) -> float:
     ends = np.flatnonzero(np.diff(q) > _SAME)
     ways = q[np.append(ends, q.size - 1)] - q[np.append(0, ends + 1)]
     return np.pi * float(ends.size + (ways // _SAME).sum()) / span
+
+
+def highest_order_alone(q: Array) -> float:
+    """
+    Return the highest order [1/rev] of a wave that a joint's positions (N,) can tell by itself.
+
+    On a grid it is that of all together. Positions at random lie closer in places, and no slower wave
+    passes through all of them: half a wave fits between neighbours as near as half of them are.
+    """
+    steps = np.diff(np.unique(q))
+    steps = steps[steps > _SAME]
+    alone = np.pi / float(np.median(steps)) if steps.size else 0.0
+    return max(alone, highest_order(q))

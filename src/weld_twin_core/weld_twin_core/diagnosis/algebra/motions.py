@@ -19,7 +19,7 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.hooks import highest_order
+from ...effects.hooks import highest_order, highest_order_alone
 from ...effects.registry import REGISTRY
 from ...effects.view import View
 from ...recording import JointMotion, Recording
@@ -105,8 +105,17 @@ def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
 
 def separable_orders(features: Sequence[Features], joint: str) -> int:
     """Return the highest order of a wave in a joint's angle that all recordings together can tell."""
+    return int(highest_order(_positions(features, joint)))
+
+
+def order_alone(features: Sequence[Features], joint: str) -> int:
+    """Return the highest order of a wave that they can tell where it is the only one."""
+    return int(highest_order_alone(_positions(features, joint)))
+
+
+def _positions(features: Sequence[Features], joint: str) -> Array:
     i = features[0].twin.robot.index(joint)
-    return int(highest_order(np.concatenate([maker.view.joint(i) for maker in features])))
+    return np.concatenate([maker.view.joint(i) for maker in features])
 
 
 def moved_most(features: Sequence[Features], joint: str | None) -> int:

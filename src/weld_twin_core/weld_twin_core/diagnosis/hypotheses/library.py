@@ -17,7 +17,7 @@ from ..algebra.motions import (
     hardly_moves,
     lacking,
     moved_most,
-    separable_orders,
+    order_alone,
     set_instead,
     together,
 )
@@ -84,7 +84,7 @@ class _Shelf:
     def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
         """Return the instances that are looked for, and among how many they were chosen."""
         if kind.traits.waves is not None and joint is not None:
-            most = min(kind.traits.waves.dense, separable_orders(self.features, joint))
+            most = min(kind.traits.waves.dense, order_alone(self.features, joint))
             lines = kind.search.lines(joint, np.arange(1.0, most + 1.0))
             return lines, float(len(lines))
         k, pull, own = moved_most(self.features, joint), None, None

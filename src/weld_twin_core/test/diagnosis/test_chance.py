@@ -14,6 +14,7 @@ from weld_twin_core.diagnosis.unseen.chance import (
     noise,
 )
 from weld_twin_core.diagnosis.unseen.folds import gain, growth, jackknife
+from weld_twin_core.effects.hooks import highest_order
 
 NOISE = 3e-5
 
@@ -67,6 +68,18 @@ def test_a_gear_that_stiffens_under_its_load_is_no_play():
     found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
     assert 'stiffening' in {site.effect for site, _ in found.causes[0].name}
     assert not any(e.effect.name == 'loaded_play' for e in found.effects)
+
+
+def test_a_fine_wave_is_told_though_stations_are_too_few_for_all_slower_ones_together():
+    joint = 'wrist_1_joint'
+    wave = wt.effects.TransmissionRipple(joint, amplitude=1.5e-3, order=80.0, phase=0.7)
+    robot, recording = stations(11, [wave], 55)
+    assert highest_order(recording.joints.q[:, 3]) < 75.0
+    found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
+    assert [(e.effect.name, e.effect.site) for e in found.effects] == [
+        ('transmission_ripple', joint)
+    ]
+    assert found.shrink.rms_after_m < 2.0 * NOISE * 3**0.5
 
 
 def groups(count, rows):

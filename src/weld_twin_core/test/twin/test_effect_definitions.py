@@ -15,7 +15,7 @@ from usual_effects import OF_CELLS, bundled
 from weld_twin_core import JointMotion, ModelError, Recording, Twin, effect_from_mapping
 from weld_twin_core.arm.controller_frames import ControllerFrames
 from weld_twin_core.effects import REGISTRY
-from weld_twin_core.effects.hooks import highest_order
+from weld_twin_core.effects.hooks import highest_order, highest_order_alone
 
 
 @dataclass
@@ -671,3 +671,15 @@ def test_waves_that_a_slow_joint_passes_are_told_however_densely_it_is_sampled(s
     twitching = places + 1e-6 * np.random.default_rng(1).standard_normal(places.size)
     assert highest_order(twitching) == pytest.approx(9 * np.pi, rel=1e-4)
     assert highest_order(np.zeros(samples)) == 0.0
+
+
+def test_a_wave_alone_is_told_by_stations_at_random_and_no_better_on_a_grid():
+    grid, rng = np.linspace(0.0, 2.0, 41), np.random.default_rng(3)
+    assert (
+        highest_order_alone(grid)
+        == pytest.approx(highest_order(grid))
+        == pytest.approx(20 * np.pi)
+    )
+    scattered = rng.uniform(0.0, 2.0, 41)
+    assert highest_order_alone(scattered) > 1.2 * highest_order(scattered)
+    assert highest_order_alone(np.zeros(5)) == 0.0

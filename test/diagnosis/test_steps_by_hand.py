@@ -137,8 +137,8 @@ def test_what_is_left_is_the_tools_where_it_is_even_and_the_gears_where_it_grows
     errors = arm * rng.normal(scale=2e-4, size=(4000, 1)) + 1e-5 * rng.normal(size=(4000, 3))
     if not of_gears:
         errors = rng.normal(scale=3e-5, size=(4000, 3))
-    one = np.ones(1, dtype=bool)
-    found = _shared(errors, np.zeros((4000, 3, 3)), arm[:, :, None], one)
+    one, still = np.ones(1, dtype=bool), np.zeros((4000, 3))
+    found = _shared(errors, np.zeros((4000, 3, 3)), arm[:, :, None], still, one)
     assert found.surely is of_gears
     if of_gears:
         # Gears err along their lever alone, and the size is that of errors in all directions.
@@ -154,12 +154,12 @@ def test_what_one_joint_alone_leaves_is_not_laid_on_the_others_and_not_on_the_in
     levers = rng.normal(scale=0.5, size=(1000, 3, 4))
     noise = rng.normal(size=(1000, 3)) * np.array([1e-5, 1e-5, 3e-5])
     shaking = noise + levers[..., 2] * rng.normal(scale=2e-4, size=(1000, 1))
-    every = np.ones(4, dtype=bool)
-    found = _shared(shaking, np.zeros((1000, 3, 3)), levers, every)
+    every, still = np.ones(4, dtype=bool), np.zeros((1000, 3))
+    found = _shared(shaking, np.zeros((1000, 3, 3)), levers, still, every)
     assert found.surely and np.flatnonzero(found.gears).tolist() == [2]
     assert found.gears[2] == pytest.approx(2e-4, rel=0.15)
     # An instrument that is less sure along one direction is still an instrument.
-    assert not _shared(noise, np.zeros((1000, 3, 3)), levers, every).surely
+    assert not _shared(noise, np.zeros((1000, 3, 3)), levers, still, every).surely
 
 
 def test_of_two_errors_that_look_alike_the_sum_is_known_and_neither_part():

@@ -77,7 +77,7 @@ def test_it_is_how_many_times_larger_the_variance_of_unseen_regions_is(true):
             own = np.sqrt((true - 1.0) / REGIONS) * open_ @ rng.normal(size=COUNT)
             residual[regions == region] += own @ here
         rows = Rows(columns, residual, 1.0)
-        prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO, NO)
+        prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO)
         rooted = Conditioning(rows, prior, np.ones(COUNT), 1.0).rooted
         told.append(dispersion(rows.parts(regions), 1.0, [rooted]))
     assert 0.6 * true < np.mean(told) < 1.6 * true
@@ -88,7 +88,7 @@ def test_regions_that_say_nothing_leave_it_at_what_is_usual():
     columns, regions = 1e-9 * rng.normal(size=(COUNT, 80)), np.repeat(np.arange(8), 10)
     residual = rng.normal(size=80)
     rows = Rows(columns, residual, 1.0)
-    prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO, NO)
+    prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO)
     rooted = Conditioning(rows, prior, np.ones(COUNT), 1.0).rooted
     # A logarithm of standard deviation one half: its exponential has the mean e^(1/8).
     told = dispersion(rows.parts(regions), 1.0, [rooted])

@@ -35,7 +35,7 @@ def arm(seed, truth, frame_width=1e3):
     residual = truth @ columns[1 : 1 + SMALL] + rng.normal(size=300)
     zero = np.zeros(SMALL + 2)
     group = np.array([-1, *[0] * SMALL, 0])
-    prior = Prior(zero, np.array([frame_width, *[5.0] * (SMALL + 1)]), group, NO, NO, NO)
+    prior = Prior(zero, np.array([frame_width, *[5.0] * (SMALL + 1)]), group, NO, NO)
     return weighed(Rows(columns, residual, 1.0), prior, 1.0)
 
 
@@ -86,33 +86,11 @@ def test_of_two_errors_that_move_the_tool_alike_the_wrong_one_is_not_told_for_su
         truth = np.where(np.arange(SMALL) % 10 == 0, 1.0, 0.0)
         columns = np.concatenate([rng.normal(size=(1, 300)), own])
         width = np.array([1e3, *[5.0] * SMALL])
-        prior = Prior(np.zeros(SMALL + 1), width, np.array([-1, *[0] * SMALL]), NO, NO, NO)
+        prior = Prior(np.zeros(SMALL + 1), width, np.array([-1, *[0] * SMALL]), NO, NO)
         rows = Rows(columns, truth @ own + rng.normal(size=300), 1.0)
         known = weighed(rows, prior, 1.0)
         off.append((known.mean[1:] - truth) / np.sqrt(np.diag(known.covariance))[1:])
     assert np.sqrt(np.mean(np.square(off))) < 1.5 and np.abs(off).max() < 5.0
-
-
-def test_a_cause_that_is_named_is_no_witness_of_how_large_other_errors_are():
-    """Of ten errors two are named; rows show each to a third of its usual size."""
-    spread, rough = [], []
-    for named in (False, True):
-        each = []
-        for seed in range(6):
-            rng = np.random.default_rng(seed)
-            columns = rng.normal(size=(11, 300))
-            residual = np.array([4.0, 3.0]) @ columns[1:3] + rng.normal(size=300)
-            group = np.array([-1, *[int(named)] * 2, *[0] * 8])
-            width = np.array([1e3, *[0.2] * 10])
-            causes = np.array([False, named])
-            prior = Prior(np.zeros(11), width, group, NO.repeat(2), NO.repeat(2), causes)
-            known = weighed(Rows(columns, residual, 1.0), prior, 1.0)
-            np.testing.assert_allclose(known.mean[1:3], [4.0, 3.0], atol=0.5)
-            each.append((np.diag(known.covariance)[3:].mean(), known.rough))
-        spread.append(np.mean(each, axis=0)[0])
-        rough.append(np.mean(each, axis=0)[1])
-    assert spread[1] < 0.8 * spread[0]
-    assert rough[1] < rough[0] - 0.15
 
 
 def test_sizes_are_drawn_as_often_as_the_normal_law_of_the_rows_says():
@@ -122,9 +100,7 @@ def test_sizes_are_drawn_as_often_as_the_normal_law_of_the_rows_says():
     columns = np.stack([frame, one, other, one + 0.5 * more])
     residual = 10.0 * one + rng.normal(size=12)
     middle, width = np.array([0.0, 0.5, -1.0, 1.0]), np.array([50.0, 1.0, 2.0, 3.0])
-    prior = Prior(
-        middle, width, np.array([-1, 0, 0, 1]), NO.repeat(2), np.array([True, False]), NO.repeat(2)
-    )
+    prior = Prior(middle, width, np.array([-1, 0, 0, 1]), NO.repeat(2), np.array([True, False]))
     noise, share = 30.0, 0.8
     chain = _Chain(Rows(columns, residual, share), prior, noise)
     often = np.zeros((2, SIZES.size))
@@ -189,7 +165,7 @@ def test_heights_along_a_curve_have_one_size_and_leave_a_slope_beside_them_as_su
         group = np.array([-1, 0, *[1] * (SMALL + 1)])
         width = np.array([1e3, *[1.0] * (SMALL + 2)])
         gears, tied = np.array([False, True]), np.array([False, True])
-        prior = Prior(np.zeros(SMALL + 3), width, group, gears, tied, ~(gears | ~gears))
+        prior = Prior(np.zeros(SMALL + 3), width, group, gears, tied)
         known = weighed(Rows(columns, residual, 1.0), prior, 1.0)
         assert np.ptp(known.open[2:]) == 0.0 and low <= known.open[2] <= high
         sure.append(np.sqrt(known.covariance[1, 1]))

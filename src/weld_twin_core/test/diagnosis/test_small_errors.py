@@ -254,7 +254,7 @@ def test_coordinates_beside_each_other_are_those_of_ridge_regression():
     columns, width = rng.normal(size=(4, 30)), np.array([0.5, 1.0, 2.0, 3.0])
     residual = rng.normal(size=30)
     none = np.zeros(4)
-    prior = Prior(none, width, none.astype(int), *[np.array([False])] * 3)
+    prior = Prior(none, width, none.astype(int), np.array([False]), np.array([False]))
     mean, covariance = Conditioning(Rows(columns, residual, 1.0), prior, width, 1.0).given()
     inverse = np.linalg.inv(columns @ columns.T + np.diag(width**-2.0))
     assert mean == pytest.approx(inverse @ columns @ residual)

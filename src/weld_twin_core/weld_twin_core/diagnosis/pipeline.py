@@ -12,10 +12,9 @@ from math import sqrt
 from ..arm.robot import Robot
 from ..effects.effect import Effect
 from ..recording import Recording
-from ..twin.posterior import Posterior
 from .advice import Limits
 from .algebra.fit import LEAST_NOISE, NOISE_TRUST
-from .algebra.noise_floor import NoiseFloor, noise_floor
+from .algebra.noise_floor import noise_floor
 from .algebra.open_directions import keep_open_directions
 from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
@@ -208,18 +207,13 @@ def _conclude(
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = choose_model(result, unseen, shrink, *which)
     result = _alone(_near_given_frames(result, examined.given.robot), shrink)
-    posterior = _allowed(result, floor, nameless=verdict.status == 'unknown')
+    fitted = (result.final.model, result.scale, result.precision)
+    posterior = allowed(result.problem, *fitted, floor, nameless=verdict.status == 'unknown')
     if result.final.model.found:
         shrink = elsewhere(shrink, posterior)
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
-
-
-def _allowed(result: Search, floor: NoiseFloor, *, nameless: bool) -> Posterior:
-    """Return the models that the recordings allow, about the one that was found."""
-    fitted = (result.final.model, result.scale, result.precision)
-    return allowed(result.problem, *fitted, floor, nameless=nameless, many=result.dense)
 
 
 def _shown(result: Search) -> tuple[float, ...]:

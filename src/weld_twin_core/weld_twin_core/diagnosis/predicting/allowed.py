@@ -74,20 +74,19 @@ def allowed(
     floor: NoiseFloor,
     *,
     nameless: bool = False,
-    many: bool = False,
 ) -> Posterior:
     """
     Return the models that the recordings allow, about one fitted to all measurements.
 
     precision: prior of the found effects' coordinates in that fit, shape (K,); may be empty.
     nameless: whether something is at work that the model has no name for: what it leaves is no noise.
-    many: whether many small errors were fitted together, of which none is a cause by itself.
     """
     recordings = problem.recordings
     jumps = sum(shown(f, max(scale.position, MICROMETRE)) for f in problem.features(model))
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
     what = _with_growth(_directions(problem, model), problem, model)
-    prior, rows = _prepared(problem, model, scale, what, many=many)
+    prior = _prior(what, model)
+    rows = _rows(problem, model, scale, what, prior)
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
     unseen = Unseen.of(problem, scale, Fit(model, rows.residual), precision)
@@ -124,7 +123,8 @@ def shown_beside_others(problem: Problem, model: Model, scale: Scale) -> tuple[f
     """
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
     what = _directions(problem, model)
-    prior, rows = _prepared(problem, model, scale, what)
+    prior = _prior(what, model)
+    rows = _rows(problem, model, scale, what, prior)
     mean, covariance = Conditioning(rows, prior, prior.width, 1.0).given()
     sizes = [effect.fit.coordinates().size for effect in what.effects]
     of = np.repeat(np.arange(len(sizes)), sizes)
@@ -213,13 +213,6 @@ def _joints(problem: Problem) -> list[Array]:
     return [r.joints.at(r.seen.t)[0] for r in problem.recordings]
 
 
-def _prepared(
-    problem: Problem, model: Model, scale: Scale, what: Directions, *, many: bool = True
-) -> tuple[Prior, Rows]:
-    prior = _prior(what, model, many=many)
-    return prior, _rows(problem, model, scale, what, prior)
-
-
 def _rows(problem: Problem, model: Model, scale: Scale, what: Directions, prior: Prior) -> Rows:
     features = problem.features(model)
     whole = [what.columns(maker, problem.stand(k)) for k, maker in enumerate(features)]
@@ -292,12 +285,8 @@ def _uneven(coordinates: Array, what: Directions) -> Array:
     return np.array([np.sqrt((h**2).mean()) for h in np.split(coordinates, begins)[1:]])
 
 
-def _prior(what: Directions, model: Model, *, many: bool) -> Prior:
-    """
-    Return the prior of frames, effects, gives, and the heights of every joint's fine curve.
-
-    many: whether what was found is small errors, and not causes that are named.
-    """
+def _prior(what: Directions, model: Model) -> Prior:
+    """Return the prior of frames, effects, gives, and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
     group, gears = plausible_arm.groups(effects)
     group[np.repeat([_only_grows(e, model) for e in effects], what.sizes)] = -1
@@ -306,16 +295,12 @@ def _prior(what: Directions, model: Model, *, many: bool) -> Prior:
     gives = np.full(what.gives, gears.size)
     curves = gears.size + springs + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
-    family = np.repeat([0, 1, 2], [gears.size + springs, len(sizes), int(not many)])
-    if not many:
-        group[plausible_arm.named(effects, model.found) & (group >= 0)] = family.size - 1
     return Prior(
         np.concatenate([np.zeros(frames), tied, np.zeros(what.shapes)]),
         plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
-        np.concatenate([gears, np.ones(springs + len(sizes), bool), family[family == 2] == 0]),
-        family == 1,
-        family == 2,
+        np.concatenate([gears, np.ones(springs + len(sizes), bool)]),
+        np.concatenate([np.zeros(gears.size + springs, bool), np.ones(len(sizes), bool)]),
     )
 
 

@@ -89,17 +89,6 @@ def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
     return np.concatenate(out)
 
 
-def named(effects: Sequence[Effect], result: Sequence[Effect]) -> NDArray[np.bool_]:
-    """Return which coordinates are those of effects found, of waves the orders found, shape (K,)."""
-    keys = {(e.name, e.site) for e in result}
-    out = [np.zeros(0, dtype=bool)]
-    for effect in effects:
-        own = effect.fit.coordinates()
-        whole = effect.traits.waves is None
-        out.append(np.full(own.size, (effect.name, effect.site) in keys) & (whole | (own != 0.0)))
-    return np.concatenate(out)
-
-
 def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
     """Return the family of every coordinate, (K,), and which are a gear's, each one by itself."""
     names = [(e.name, None if e.traits.waves is None else e.site) for e in effects]

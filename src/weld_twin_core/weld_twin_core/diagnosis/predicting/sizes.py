@@ -7,11 +7,10 @@ No arm is exact, but most of what it could have it has next to nothing of. Every
 has one of a few sizes, and a model is a choice of sizes. Models are drawn as often as the recordings
 vouch for them: one size after the other given all other sizes [1]_, whatever the values of the
 coordinates are. Given its own value a coordinate that is small would hardly ever become large. What
-sizes are usual is learned along, family by family and from all families together. A cause that is
-named tells nothing of that: a gear that has worn is no witness of how well the arm was made. What no
-data could show, for it is one with a fitted frame or does nothing in them, is as wide as machines have
-it, but for what the others of its family show: that an arm is good in one thing is no witness of what
-nobody looked at.
+sizes are usual is learned along, family by family and from all families together. What no data could
+show, for it is one with a fitted frame or does nothing in them, is as wide as machines have it, but for
+what the others of its family show: that an arm is good in one thing is no witness of what nobody looked
+at.
 
 References
 ----------
@@ -68,9 +67,6 @@ class Prior:
     """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
     geometry."""
     tied: NDArray[np.bool_]  # families whose coordinates all have one size, shape (G,)
-    causes: NDArray[np.bool_]
-    """Families of causes that are named, shape (G,): each of a size as before anything is known, and
-    no witness of how large others are."""
 
 
 class Products(NamedTuple):
@@ -199,7 +195,7 @@ class _Chain:
             self.hidden[each] = False
         self.small = (prior.group >= 0) & ~self.hidden
         self.single = self.small & ~prior.tied[prior.group]
-        self.counted = self.single & ~prior.causes[prior.group]
+        self.counted = self.single.copy()
         self.counted[[each[0] for each in self.tied]] = True
         # What was found is as large as it was found, for the chain may come upon it late.
         off = np.log(np.maximum(np.abs(self.middle), EMPTY))[:, None] - np.log(SIZES)
@@ -327,4 +323,3 @@ class _Chain:
             drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
             drawn = np.maximum(drawn, EMPTY)
             self.belief[part] = drawn / drawn.sum(axis=1, keepdims=True)
-        self.belief[self.prior.causes] = BELIEF

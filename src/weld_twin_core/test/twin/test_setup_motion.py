@@ -25,7 +25,7 @@ from weld_twin_core import (
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
 from weld_twin_core.diagnosis.unseen.held_out_shrink import _for_bag
 from weld_twin_core.effects import REGISTRY, Plausible, ToolPose, ToolSlip
-from weld_twin_core.effects.dated import in_use, of_the_robot, seen_from
+from weld_twin_core.effects.dated import JointSlip, in_use, of_the_robot, seen_from
 from weld_twin_core.effects.loads import mass_range
 from weld_twin_core.effects.plausible import beyond, plausible, ranges, spreads, table
 
@@ -260,3 +260,8 @@ def test_an_effect_of_ones_own_says_how_large_it_may_be():
 def test_names_and_not_files_decide_the_order_of_effects():
     names = [name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')]
     assert names == sorted(names)
+
+
+def test_what_slipped_a_day_later_is_told_in_hours(ur5):
+    soon, late = (JointSlip('elbow_joint', 1e-3, time).remedy(ur5) for time in (60.5, 86_500.0))
+    assert 'at t = 60.5; then' in soon and 'at t = 24.028 h; then' in late

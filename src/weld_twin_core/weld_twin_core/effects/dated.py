@@ -26,6 +26,9 @@ from .view import Array, Parameter, Plausible, Robot, Shift, Stage, Value, View
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
 
+_DAYS = 1e4
+"""Seconds from which on an instant is read in hours: few recordings last as long."""
+
 _T = TypeVar('_T', bound='_Timed')
 
 
@@ -79,6 +82,11 @@ class Sudden(_Timed):
     def share(self, view: View) -> Array:
         return (view.dates >= self.time).astype(np.float64)
 
+    def _when(self) -> str:
+        """Return the instant in words; of recordings on several days it is many seconds."""
+        seconds = self._plain('time')
+        return f't = {seconds:.4g}' if abs(seconds) < _DAYS else f't = {seconds / 3600.0:.5g} h'
+
 
 @register
 class JointSlip(Sudden, ChannelError):
@@ -111,7 +119,7 @@ class JointSlip(Sudden, ChannelError):
     def remedy(self, robot: Robot) -> str:
         return (
             f'See to the belt, coupling and encoder of {self.site}: it slipped by '
-            f'{self._shifted(robot, self._plain("offset"))} at t = {self._plain("time"):.4g}; then '
+            f'{self._shifted(robot, self._plain("offset"))} at {self._when()}; then '
             'master it again.'
         )
 
@@ -146,7 +154,7 @@ class ToolSlip(_SuddenFrame):
     def remedy(self, robot: Robot) -> str:
         return (
             f'Fasten the tool or the reflector: it moved by {self.in_words(robot)} at '
-            f't = {self._plain("time"):.4g}; measure its centre point again.'
+            f'{self._when()}; measure its centre point again.'
         )
 
 
@@ -173,7 +181,7 @@ class InstrumentKnock(_SuddenFrame):
     def remedy(self, robot: Robot) -> str:
         return (
             f'Fasten the instrument and the base: one moved by {self.in_words(robot)} at '
-            f't = {self._plain("time"):.4g}; measure what came before and after apart.'
+            f'{self._when()}; measure what came before and after apart.'
         )
 
 

@@ -361,12 +361,17 @@ def _holding(variances: Array, likely: Array, beside: float) -> float:
     def held(variance: float) -> float:
         return float(likely @ chdtr(3, limit * (beside + variance) / (beside + variances + EMPTY)))
 
-    low, high = 0.0, float(variances.max())
-    if held(low) >= COVERED:
+    return _least(held, COVERED, float(variances.max()))
+
+
+def _least(held: Callable[[float], float], wanted: float, high: float) -> float:
+    """Return the least variance up to a high one with which as many errors are held as shall be."""
+    low = 0.0
+    if held(low) >= wanted:
         return low
     for _ in range(STEPS):
         middle = (low + high) / 2.0
-        low, high = (low, middle) if held(middle) >= COVERED else (middle, high)
+        low, high = (low, middle) if held(middle) >= wanted else (middle, high)
     return high
 
 
@@ -503,13 +508,8 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     def held(variance: float) -> float:
         return float(np.mean((along / (spread + variance)).sum(axis=0) <= limit))
 
-    low, high = 0.0, 100.0 * float((errors**2).sum(axis=1).max()) + NANOMETRE**2
-    if held(low) >= wanted:
-        return 0.0
-    for _ in range(STEPS):
-        middle = (low + high) / 2.0
-        low, high = (low, middle) if held(middle) >= wanted else (middle, high)
-    return float(np.sqrt(high))
+    high = 100.0 * float((errors**2).sum(axis=1).max()) + NANOMETRE**2
+    return float(np.sqrt(_least(held, wanted, high)))
 
 
 def known_noise(problem: Problem, floor: NoiseFloor) -> float | None:

@@ -441,7 +441,7 @@ class _Seen:
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         recording = self.problem.recordings[k]
-        t, after = recording.seen.t, self._after(recording)
+        t, after = recording.seen.t, self._after(k)
         # At the ends of a recording a step cannot be told from the end's own troubles.
         edge = max(3, int(FEW * t.size / 2.0))
         allowed = np.zeros(t.size, dtype=bool)
@@ -498,11 +498,10 @@ class _Seen:
         ends = [float(r.seen.t[-1]) + r.later - recording.later for r in self.problem.recordings]
         return max((end for end in ends if end < recording.seen.t[0]), default=np.inf)
 
-    def _after(self, recording: Recording) -> NDArray[np.bool_]:
+    def _after(self, k: int) -> NDArray[np.bool_]:
         """Return the samples of recordings that began later: what gave way stays so in them."""
-        starts = [float(r.joints.t[0]) + r.later for r in self.problem.recordings]
-        began = float(recording.joints.t[0]) + recording.later
-        return np.repeat(np.array(starts) > began, self.rest.samples)
+        began = np.array([r.joints.t[0] + r.later for r in self.problem.recordings])
+        return np.repeat(began > began[k], self.rest.samples)
 
     def _in_recording(self, shape: Array, k: int) -> Array:
         out = np.zeros(self.rest.recording.size)

@@ -7,6 +7,7 @@ Break the code on purpose, one place at a time, and count how often the tests no
     tools/in_env python tools/mutants.py                     200 drawn from the whole diagnosis
     tools/in_env python tools/mutants.py --room weld_twin_core.twin --draw 60
     tools/in_env python tools/mutants.py --room all --draw 60  from each room of all packages in turn
+    tools/in_env python tools/mutants.py --room product --draw 60  by lines, from all that users have
 
 A mutant is a comparison turned round or moved to its boundary, a number 25 % up or down, a sign, a
 term that is dropped, two arguments exchanged, the least for the most, 'and' for 'or', or a branch
@@ -14,8 +15,8 @@ that is taken never or always. Defaults of functions and of dataclasses count as
 
 The tests run once as they are, and it is noted which functions each of them runs. Then a process is
 forked for every mutant. It puts the broken function in the place of the right one and runs the tests
-that reach it, what sees most first, until one fails. Exits with 1 when fewer than --least are
-caught.
+of its room that reach it, what sees most first, until one fails. Exits with 1 when fewer than
+--least are caught.
 """
 
 from __future__ import annotations
@@ -23,10 +24,12 @@ import __future__
 
 import argparse
 import ast
+import bisect
 import copy
 import dataclasses
 import functools
 import importlib
+import itertools
 import os
 import pickle
 import random
@@ -71,9 +74,20 @@ TESTS = {
 }
 """Which files of tests ask about a room of the engine before all others, by their names, beside
 those that import the module drawn. Rooms of other packages are asked about by such files alone, and
-by folders of their name."""
+by folders of their name, or of that which is here."""
+FOLDERS = {
+    'assembly': 'messages_and_bags',
+    'bags': 'messages_and_bags',
+    'demo': 'cli',
+    'effects': 'twin',
+    'harness': 'live',
+    'messages': 'messages_and_bags',
+    'wording': 'report',
+}
 EVERY = 'all'
 """What stands for the rooms of all packages."""
+PRODUCT, PROOFS = 'product', 'weld_twin_lab'
+"""What stands for all packages but that of the proofs."""
 QUICK = 'not slow and not cells'
 CHEAP, SLOW, SPENT = 0.2, 6.0, 12.0
 """Seconds that a test takes which is asked at once, that one may take, and all of them together."""
@@ -369,7 +383,9 @@ class Asked:
         files: dict[str, Path],
         trees: dict[str, ast.Module],
         jobs: int,
+        of_room: dict[str, set[Path]],
     ) -> None:
+        self.of_room = of_room
         self.drawn, self.files, self.trees, self.jobs = list(drawn), files, trees, jobs
         self.told: list[tuple[Place, str, bool]] = []
         self.spent = 0.0
@@ -449,9 +465,12 @@ class Asked:
             print(f'not put: {place}: {error!r}', flush=True)
             return 1
         spent, own = 0.0, files_for(place)
+        of_room = self.of_room.get(room_of(place))
         for seconds, ran, item in sorted(
             reach, key=lambda each: each[2].path.relative_to(ROOT) not in own
         ):
+            if of_room and item.path.relative_to(ROOT) not in of_room:
+                continue
             inside = not isinstance(top, Function) or (file, first) in ran
             if inside and fails(item):
                 return 1
@@ -474,20 +493,6 @@ def fails(item: Any) -> bool:
             sys.stderr = kept
 
 
-def asking(drawn: Sequence[Place]) -> list[str]:
-    """Return the files of tests that ask about drawn mutants."""
-    if all(place.module.startswith(f'{ENGINE}.') for place in drawn):
-        return sorted(map(str, set().union(*map(files_for, drawn))))
-    folders = {room_of(place).partition('.')[2] for place in drawn}
-    files = sorted([*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py')])
-    wanted = {place.module for place in drawn}
-    return [
-        str(file)
-        for file in files
-        if file.parent.name in folders or any(imports(file, module) for module in wanted)
-    ]
-
-
 @functools.cache
 def imports(file: Path, module: str) -> bool:
     """Return whether a file of tests imports a module, or what it holds as a name of the package."""
@@ -502,12 +507,20 @@ def imports(file: Path, module: str) -> bool:
     )
 
 
-def files_for(place: Place) -> set[Path]:
-    """Return the files that ask about a place of the engine before others."""
+@functools.cache
+def files_for(place: Place) -> frozenset[Path]:
+    """Return the files that ask about a place before others; outside the engine those of its room."""
+    files = (*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py'))
+    if room_of(place) != ENGINE:
+        name = room_of(place).partition('.')[2]
+        folder = FOLDERS.get(name, name)
+        return frozenset(
+            file for file in files if file.parent.name == folder or imports(file, place.module)
+        )
     inside = place.module.removeprefix(f'{ENGINE}.').split('.')[0]
     names = {f'test_{name}' for name in f'{WHOLE} {TESTS.get(inside, "")}'.split()}
-    files = (*Path('test').rglob('test_*.py'), *Path(CORE).rglob('test_*.py'))
-    return {file for file in files if file.stem in names or imports(file, place.module)}
+    near = (file for file in files if file.is_relative_to(CORE) or file.parts[0] == 'test')
+    return frozenset(file for file in near if file.stem in names or imports(file, place.module))
 
 
 def room_of(place: Place) -> str:
@@ -527,6 +540,18 @@ def drawn_from(every: Sequence[Place], count: int, seed: int, *, in_turn: bool) 
         turns[room_of(place)] += 1
         keyed.append((turns[room_of(place)], place))
     return [place for _, place in sorted(keyed, key=lambda each: each[0])[:most]]
+
+
+def spread(every: Sequence[Place], files: dict[str, Path], count: int, seed: int) -> list[Place]:
+    """Return so many places, each room its share of them by its lines."""
+    draw, inside = random.Random(seed), dict[str, list[Place]]()
+    for place in every:
+        inside.setdefault(place.module, []).append(place)
+    names = sorted(inside)
+    lines = [len(files[name].read_text(encoding='utf-8').splitlines()) for name in names]
+    ends, first = list(itertools.accumulate(lines)), draw.random()
+    steps = ((first + k) * ends[-1] / count for k in range(count))
+    return [draw.choice(inside[names[bisect.bisect(ends, at)]]) for at in steps]
 
 
 def modules(rooms: Sequence[str]) -> dict[str, Path]:
@@ -586,16 +611,25 @@ def main() -> int:
     os.chdir(ROOT)
     import pytest
 
-    whole = args.room == [EVERY]
+    whole, product = args.room == [EVERY], args.room == [PRODUCT]
     packages = sorted(place.name for place in (ROOT / 'src').iterdir())
     rooms = packages if whole else args.room or [ENGINE]
+    if product:
+        rooms = [name for name in packages if name != PROOFS]
     files = modules(rooms)
     trees = {name: ast.parse(file.read_text(encoding='utf-8')) for name, file in files.items()}
     every = [place for name, tree in trees.items() for place in places(name, tree)]
-    drawn = drawn_from(every, args.draw, args.seed, in_turn=whole)
-    asked = Asked(drawn, files, trees, args.jobs)
+    if product:
+        drawn = spread(every, files, args.draw, args.seed)
+    else:
+        drawn = drawn_from(every, args.draw, args.seed, in_turn=whole)
+    of_room: dict[str, set[Path]] = {}
+    for place in drawn if args.tests is None else ():
+        of_room.setdefault(room_of(place), set()).update(files_for(place))
+    asked = Asked(drawn, files, trees, args.jobs, of_room)
     options = ['-q', '-n', '0', '-p', 'no:cacheprovider', '--no-header', '-s', '-m', QUICK]
-    pytest.main([*options, *(args.tests or asking(drawn))], plugins=[asked])
+    asking = args.tests or sorted(map(str, set().union(*of_room.values())))
+    pytest.main([*options, *asking], plugins=[asked])
     return told(asked, args.least)
 
 

@@ -189,6 +189,10 @@ def test_spread_is_the_mean_distance_to_the_middle():
             {'contacts': {'a': 'point', 'b': 'plane'}, 'distances': [{'between': ['a', 'b']}]},
             'a value in distances must be a number, got None',
         ),
+        (
+            {'contacts': {'a': 'point'}, 'distances': [{'between': ['a', 'a'], 'value': 1.0}]},
+            'the distance between a and a: name two different contacts',
+        ),
     ],
 )
 def test_an_artefact_that_makes_no_sense_is_refused(entry, message):

@@ -39,7 +39,7 @@ def study(ur5):
     [
         ('normal', (1.0, 2.0), stats.norm(1.0, 2.0)),
         ('uniform', (-1.0, 3.0), stats.uniform(-1.0, 4.0)),
-        ('triangular', (0.0, 1.0, 4.0), stats.triang(0.25, 0.0, 4.0)),
+        ('triangular', (1.0, 2.0, 5.0), stats.triang(0.25, 1.0, 4.0)),
         ('lognormal', (2.0, 0.5), stats.lognorm(0.5, scale=2.0)),
     ],
 )

@@ -17,6 +17,7 @@ MOTION = JointMotion([0.0, 1.0], np.zeros((2, 6)))
 
 DATA = [
     (lambda: readonly('x', (None,), 'q'), "q must be numbers, got 'x'"),
+    (lambda: readonly('x' * 99, (None,), 'q'), f"q must be numbers, got '{'x' * 56}..."),
     (lambda: readonly([[1]], (None,), 'q'), 'q must have shape (any), got (1, 1)'),
     (
         lambda: readonly([1, np.nan, np.inf], (3,), 'q'),

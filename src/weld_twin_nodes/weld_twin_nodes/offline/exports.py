@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
-from weld_twin_core.effects import Effect
+from weld_twin_core.effects import Effect, JointOffset
 from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.compensation import corrected, joint_offsets
@@ -213,23 +213,16 @@ def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, remaining = corrected(based, (*_lasting(model), *_changes(model)))
+    zeros = _zeros(model)
+    keyed = [JointOffset(name, zero) for name, zero in zip(based.joint_names, zeros, strict=True)]
+    robot, remaining = corrected(based, (*_lasting(model), *_changes(model), *keyed))
     # What the file has for use by itself, the effects that go with it take back.
     remaining = (*remaining, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
-    zeros = _zeros(model)
-    if zeros.any():
-        key = np.where(robot.prismatic, 0.0, zeros), np.where(robot.prismatic, zeros, 0.0)
-        robot = replace(
-            robot,
-            theta=robot.theta + key[0],
-            d=robot.d + key[1],
-            lower=robot.lower - zeros,
-            upper=robot.upper - zeros,
-        )
     source = f'{robot.source}; {CORRECTED}' if robot.source else CORRECTED
     if model.mended:
         source += f' of mended data: {" ".join(model.mended)}'
-    return replace(robot, source=source), remaining
+    lower, upper = robot.lower - zeros, robot.upper - zeros
+    return replace(robot, source=source, lower=lower, upper=upper), remaining
 
 
 def _pair(model: Model, *, corrected: bool) -> list[str]:

@@ -12,7 +12,7 @@ from served import Person, Server, fill, small_disk
 
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.main import parser_of
-from weld_twin_report.serve.fields import CORRECT, DIAGNOSE, given, sentence, words
+from weld_twin_report.serve.fields import CORRECT, DIAGNOSE, IMPORT, given, sentence, words
 
 TABLE = b'J1,J2,J3,J4,J5,J6,X,Y,Z\n' + b'0,-90,90,0,90,0,500,0,600\n' * 30
 """Thirty times the same station: read, and refused."""
@@ -147,6 +147,14 @@ def test_a_region_of_the_browser_is_a_box_and_no_file_of_the_server():
     for other in ('found/diagnosis.json', '/etc/passwd', '1,2,3', f'{box}:1'):
         with pytest.raises(DataError, match='Where it matters'):
             given({'region': other}, (DIAGNOSE,))
+
+
+def test_signs_of_joints_are_taken_as_people_write_them():
+    assert words(given({'joint_signs': '1 -1; +1,-'}, (IMPORT,)), IMPORT) == [
+        '--joint-signs=1,-1,1,-1'
+    ]
+    with pytest.raises(DataError, match='Signs of the joints'):
+        given({'joint_signs': '1,-1,2'}, (IMPORT,))
 
 
 def test_what_commands_say_names_fields_of_the_browser():

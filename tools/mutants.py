@@ -77,9 +77,10 @@ those that import the module drawn. Rooms of other packages are asked about by s
 by folders of their name, or of that which is here."""
 FOLDERS = {
     'assembly': 'messages_and_bags',
-    'bags': 'messages_and_bags',
+    'bags': 'messages_and_bags recording',
     'demo': 'cli',
     'effects': 'twin',
+    'files': 'files cli',
     'harness': 'live',
     'messages': 'messages_and_bags',
     'wording': 'report',
@@ -513,9 +514,9 @@ def files_for(place: Place) -> frozenset[Path]:
     files = (*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py'))
     if room_of(place) != ENGINE:
         name = room_of(place).partition('.')[2]
-        folder = FOLDERS.get(name, name)
+        folders = FOLDERS.get(name, name).split()
         return frozenset(
-            file for file in files if file.parent.name == folder or imports(file, place.module)
+            file for file in files if file.parent.name in folders or imports(file, place.module)
         )
     inside = place.module.removeprefix(f'{ENGINE}.').split('.')[0]
     names = {f'test_{name}' for name in f'{WHOLE} {TESTS.get(inside, "")}'.split()}

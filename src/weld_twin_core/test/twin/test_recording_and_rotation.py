@@ -14,6 +14,7 @@ from scipy.stats.qmc import Halton
 from weld_twin_core import DataError, JointMotion, Measurements, Recording, Signal, rotation
 from weld_twin_core.arrays import halton
 from weld_twin_core.cubics import hermite, natural_slopes
+from weld_twin_core.recording import on_one_clock
 
 vectors = st.tuples(*[st.floats(-1.7, 1.7)] * 3).map(np.array)
 
@@ -32,6 +33,19 @@ def test_positions_between_samples_follow_the_measured_velocity():
     # Cubic Hermite: h^4 / 384 times the fourth derivative, h^3 / 72 sqrt(3) for the slope.
     assert np.abs(q[:, 0] - np.sin(at)).max() < 0.25**4 / 384
     assert np.abs(qd[:, 0] - np.cos(at)).max() < 0.25**3 / 72 * np.sqrt(3) * 1.01
+
+
+def test_dates_tell_how_much_later_recordings_are_and_without_them_each_follows_the_last():
+    def later(*dates):
+        motion = JointMotion([1.0, 3.0], np.zeros((2, 1)))
+        runs = [Recording('run', motion, epoch_ns=int(date * 1e9)) for date in dates]
+        return [run.later for run in on_one_clock(runs)]
+
+    day = 1.7e9
+    assert later(day, day + 60.0, day + 20.0) == pytest.approx([0.0, 60.0, 20.0])
+    # One second after the end at 3 s, where the stamps begin at 1 s.
+    assert later(0, 0, 0) == [0.0, 3.0, 6.0]
+    assert later(day, 0) == later(0, day) == [0.0, 3.0]
 
 
 def test_outside_its_stamps_a_motion_rests_at_its_ends():

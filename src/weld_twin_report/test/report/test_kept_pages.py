@@ -402,7 +402,7 @@ CASES = {
     },
     'unknown': {
         'to be measured': lambda: replace(
-            diagnoses.unknown(), next_experiment={'sentence': 'Measure 5 stations.'}
+            diagnoses.unknown(), next_experiment={'kind': 'touches', 'sentence': 'Touch 5 places.'}
         ),
         'tried without one': lambda: absent(
             diagnoses.unknown(), backlash='excluded by the user', drift='no time'

@@ -78,11 +78,13 @@ by folders of their name, or of that which is here."""
 FOLDERS = {
     'assembly': 'messages_and_bags',
     'bags': 'messages_and_bags recording',
+    'cli': 'cli offline report',
     'demo': 'cli',
     'effects': 'twin',
     'files': 'files cli',
     'harness': 'live',
     'messages': 'messages_and_bags',
+    'offline': 'offline programs',
     'wording': 'report',
 }
 EVERY = 'all'

@@ -8,7 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...arm.robot import Robot
+from ...arrays import Array
 from ...effects.effect import Effect, Stage
+from ...effects.plausible import ranges
 from ...twin.features import joints_of
 from ..algebra.columns import SHOWN, Columns, Maker, Piece
 from ..algebra.motions import (
@@ -41,7 +44,7 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
         if sudden.name not in exclude:
             shelf.place(Site.of(sudden), [sudden], float(sum(problem.samples)))
     index = [own for unit in shelf.units for own in unit.columns]
-    systems = SeedSystems.of(index, [piece.normal() for piece in shelf.pieces])
+    systems = SeedSystems.of(index, shelf.normals)
     columns = Columns.joined(shelf.pieces or [Piece(np.zeros((0, problem.size)))])
     return Library(columns, systems, tuple(shelf.units), shelf.absent)
 
@@ -52,11 +55,12 @@ class _Shelf:
     def __init__(
         self, problem: Problem, model: Model, scale: Scale, exclude: Sequence[str]
     ) -> None:
-        self.features = problem.features(model)
+        self.robot, self.features = model.robot, problem.features(model)
         self.excluded = frozenset(exclude)
         self.alike = set_instead(model.robot, problem.align, self.excluded)
         self.absent = dict.fromkeys(exclude, EXCLUDED)
         self.pieces: list[Piece] = []
+        self.normals: list[Array] = []
         self.units: list[Unit] = []
         self._count = 0
         self._still: dict[str, dict[str, None]] = {}
@@ -124,8 +128,9 @@ class _Shelf:
         if not shown:
             return
         columns = []
-        for _, piece in shown:
+        for seed, piece in shown:
             self.pieces.append(piece)
+            self.normals.append(piece.normal() + _believed(self.robot, seed, piece.count))
             columns.append(np.arange(self._count, self._count + piece.count))
             self._count += piece.count
         kept = tuple(seed for seed, _ in shown)
@@ -138,3 +143,16 @@ def _shown(seed: Effect, piece: Piece) -> bool:
     scales = seed.fit.coordinate_scales()
     reach = 1e3 * float(scales.max()) if scales.size else 1.0
     return bool(piece.peaks().max(initial=0.0) * reach > SHOWN)
+
+
+def _believed(robot: Robot, seed: Effect, count: int) -> Array:
+    """
+    Return the prior precision of a seed's columns, shape (K, K): no machine has more than its range.
+
+    The range and not the spread: the noise that a search begins with is what all causes leave.
+    """
+    reach = np.max(np.abs(ranges(robot, seed)), axis=0)
+    straight = seed.fit.straight()
+    each = [seed.from_atoms(one).fit.coordinates() for one in np.eye(count)]
+    share = np.array([(own / reach)[straight] for own in each])
+    return np.diag((share**2).sum(axis=1))

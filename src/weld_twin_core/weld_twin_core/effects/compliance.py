@@ -399,7 +399,6 @@ class ToolSag(Effect):
         entered='program',
         depends_on='load',
         place='tool',
-        common=False,
     )
     of = 'robot'
     stage = Stage.LINK

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every effect against its definition, written a second time as loops over plain matrices."""
 
+import tracemalloc
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -16,6 +17,7 @@ from weld_twin_core import JointMotion, ModelError, Recording, Twin, effect_from
 from weld_twin_core.arm.controller_frames import ControllerFrames
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.hooks import highest_order, highest_order_alone
+from weld_twin_core.effects.view import View
 
 
 @dataclass
@@ -683,3 +685,17 @@ def test_a_wave_alone_is_told_by_stations_at_random_and_no_better_on_a_grid():
     scattered = rng.uniform(0.0, 2.0, 41)
     assert highest_order_alone(scattered) > 1.2 * highest_order(scattered)
     assert highest_order_alone(np.zeros(5)) == 0.0
+
+
+@pytest.mark.parametrize('travel', [6.0, 60.0, 2e3])
+def test_stairs_are_looked_for_within_bounded_memory(ur5, travel):
+    # A reading in the wrong unit, or of a program that went astray, may travel any way.
+    q = np.random.default_rng(1).uniform(0.0, travel, (2000, 6))
+    t, pull = np.arange(2000.0), 5e-3 * np.rint(q[:, 2] / 5e-3) - q[:, 2]
+    view = View(ur5, t, t, q, np.zeros_like(q), static=True)
+    tracemalloc.start()
+    found = list(REGISTRY['quantization'].seeds(view, 'elbow_joint', pull))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3e8
+    assert travel > 1e3 or any(abs(seed.step - 5e-3) < 1e-4 for seed in found)

@@ -27,6 +27,9 @@ _QUICK = (5, 9, 15, 25, 27, 45)
 in memory that it takes three times as long, a good part of a diagnosis of some stations."""
 _ZOOM, _ZOOMS = 16, 3
 """Steps tried to either side at each closer look, and how many looks there are."""
+_CELLS = 2**21
+"""Cells of a joint's travel at most, which bounds memory, too: after some ten turns the finest steps are
+not looked for."""
 _MOST = 2000
 """Steps tried at once at most, which bounds memory."""
 _PHASES = 16
@@ -139,15 +142,16 @@ class Quantization(Effect):
         travel = float(np.ptp(q))
         if travel < 4.0 * _FINEST:
             return
-        cell = 0.25 * _FINEST
+        cell = max(0.25 * _FINEST, travel / _CELLS)
+        finest = 4.0 * cell
         bins = np.rint((q - q.min()) / cell).astype(int)
         least = 4 * (int(bins.max()) + 1)
         lengths = _QUICK if view.static else (1,)
         size = min(odd << (-(-least // odd) - 1).bit_length() for odd in lengths)
         spectrum = np.fft.rfft(np.bincount(bins, pull, minlength=size))
-        power = np.abs(spectrum[: int(size * cell / _FINEST) + 2]) ** 2
+        power = np.abs(spectrum[: int(size * cell / finest) + 2]) ** 2
         step = size * cell / np.maximum(np.arange(power.size), 1)
-        power[(step < _FINEST) | (step > min(_COARSEST, 0.5 * travel))] = 0.0
+        power[(step < finest) | (step > min(_COARSEST, 0.5 * travel))] = 0.0
         for _ in range(_PEAKS):
             k = int(np.argmax(power))
             if power[k] <= 0.0:

@@ -79,7 +79,7 @@ def test_it_is_how_many_times_larger_the_variance_of_unseen_regions_is(true):
         rows = Rows(columns, residual, 1.0)
         prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO)
         rooted = Conditioning(rows, prior, np.ones(COUNT), 1.0).rooted
-        told.append(dispersion(rows.parts(regions), 1.0, [rooted]))
+        told.append(dispersion(rows.parts(regions), 1.0, [rooted])[0])
     assert 0.6 * true < np.mean(told) < 1.6 * true
 
 
@@ -91,5 +91,5 @@ def test_regions_that_say_nothing_leave_it_at_what_is_usual():
     prior = Prior(np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT, int), NO, NO)
     rooted = Conditioning(rows, prior, np.ones(COUNT), 1.0).rooted
     # A logarithm of standard deviation one half: its exponential has the mean e^(1/8).
-    told = dispersion(rows.parts(regions), 1.0, [rooted])
+    told, _ = dispersion(rows.parts(regions), 1.0, [rooted])
     assert told == pytest.approx(np.exp(0.125), rel=0.01)

@@ -46,6 +46,31 @@ def run(ur5, rng):
     return recorded(real, moving(ur5, rng), rng, points=True)
 
 
+@pytest.mark.parametrize(
+    ('samples', 'to'), [([500], 0.0), ([300, 420, 900], 1e6), ([100, 700], 0.3)]
+)
+def test_a_reading_that_strays_by_itself_is_left_out_and_told(ur5, run, samples, to):
+    q = np.array(run.joints.q)
+    q[samples, 2] += to + 0.5
+    strayed = looked_at(ur5, rejointed(run, q), apply=True)
+    said = [check.sentence for check in strayed.checks if check.name == 'joint readings']
+    assert len(said) == 1 and 'elbow_joint' in said[0] and 'left out' in said[0]
+    (kept,) = strayed.given.recordings
+    assert kept.joints.t.size == run.joints.t.size - len(samples)
+    assert not strayed.unsound
+
+
+def test_a_joint_that_turns_back_at_full_speed_does_not_stray(ur5, run):
+    """Out and back at one speed, and at rest for most of the time: every turn is a corner."""
+    t = run.joints.t
+    saw = np.clip(np.abs((t % 8.0) - 1.0), 0.0, 1.0)
+    sparse = run.joints.q.copy()
+    sparse[:, 2] += saw
+    motion = replace(run.joints, t=t[::25], q=sparse[::25], qd=None)
+    kept = looked_at(ur5, replace(run, joints=motion), apply=True).given.recordings[0]
+    assert kept.joints.t.size == motion.t.size
+
+
 def test_joints_swept_one_after_the_other_show_the_sign_of_each(ur5, rng):
     home = np.array([0.4, -1.2, 1.4, -1.0, -1.3, 0.3])
     q = np.concatenate([home + np.outer(np.linspace(-0.9, 0.9, 9), row) for row in np.eye(6)])

@@ -33,7 +33,7 @@ from .rows import rows
 from .set_up import gravity, orientation, parted, setup
 from .slips import Slip
 from .stamps import clocks, stamps, streams, velocities_checked
-from .stuck import stuck
+from .stuck import stuck, told_astray, without_astray
 from .touches import touches
 
 
@@ -112,7 +112,7 @@ class Examined:
         for each in self.mistakes:
             if each.mend is not None and ONE not in (as_entry(each.mend) or {}):
                 out = each.mend(out)
-        return tuple(velocities_checked(recording) for recording in out.recordings)
+        return tuple(without_astray(velocities_checked(one)) for one in out.recordings)
 
 
 def examine(
@@ -130,6 +130,7 @@ def examine(
     """
     if len(given.recordings) > 1:
         given = replace(given, recordings=on_one_clock(given.recordings))
+    left_out, given = _astray(given)
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid
         look = _Look(mistakes=streams(trial))
@@ -151,11 +152,24 @@ def examine(
         trial if done else given,
         look.marked(mistakes) if done or not mistakes else None,
         # What the checks say of data mended on trial holds for nothing that was given.
-        (*_first(mistakes, applied=done), *(look.checks if done or not mistakes else ())),
+        (
+            *left_out,
+            *_first(mistakes, applied=done),
+            *(look.checks if done or not mistakes else ()),
+        ),
         (*(m.as_unsound(applied=done) for m in mistakes), *look.unsound),
         tuple(mistakes) if done else (),
         look.dated,
     )
+
+
+def _astray(given: Given) -> tuple[list[Check], Given]:
+    """Return which joints' readings strayed by themselves, and what was given without them."""
+    names = given.robot.joint_names
+    said = [one for own in given.recordings for one in told_astray(own, names)]
+    kept = tuple(without_astray(own) for own in given.recordings)
+    out = [Check('joint readings', 'warning', sentence) for sentence in said]
+    return out, replace(given, recordings=kept)
 
 
 def _first(mistakes: Sequence[Finding], *, applied: bool) -> list[Check]:

@@ -1,10 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Do readings of joints stand still, to the last digit, while the tool goes on?"""
+"""Do readings of joints stand still, to the last digit, while the tool goes on? Does one stray alone?"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from ...recording import JointMotion, Recording
 from ...twin.features import Features
 from ..algebra.problem import ROWS, Model
 from ..frames.alignment import refined
-from ..limits import CLEAR, ENOUGH, FEW, LATE, MOST, RUN, SOUND
+from ..limits import CLEAR, ENOUGH, FEW, LATE, MOST, MOVED, RUN, SOUND
 from .evidence import Case, Finding, mistake
 from .lengths import distance, length
 
@@ -142,3 +142,49 @@ def _when(recording: Recording, start: int, end: int) -> str:
     if recording.joints.static:
         return f'from station {start} to {end}'
     return f'from t = {t[start]:.4g} to {t[end]:.4g} s'
+
+
+def without_astray(recording: Recording) -> Recording:
+    """Return it without the samples of a motion in which a joint's reading strays by itself."""
+    joints, out = recording.joints, np.unique(np.concatenate(astray(recording.joints)))
+    if not out.size:
+        return recording
+    qd = None if joints.qd is None else np.delete(joints.qd, out, axis=0)
+    t, q = np.delete(joints.t, out), np.delete(joints.q, out, axis=0)
+    return replace(recording, joints=replace(joints, t=t, q=q, qd=qd))
+
+
+def told_astray(recording: Recording, names: Sequence[str]) -> list[str]:
+    """Return in sentences which joints' readings were left out of a recording, and when."""
+    t, q = recording.joints.t, recording.joints.q
+    return [
+        f'The reading of joint {names[i]!r} of {recording.name} leapt off its path and back '
+        f'{"once" if at.size == 1 else f"{at.size} times"}, first at t = {t[at[0]]:.4g} s to '
+        f'{q[at[0], i]:.4g}: left out.'
+        for i, at in enumerate(astray(recording.joints))
+        if at.size
+    ]
+
+
+def astray(joints: JointMotion) -> list[NDArray[np.int_]]:
+    """Return the samples of a motion in which each joint's reading leaps off its path and back."""
+    if joints.static or joints.t.size <= ENOUGH:
+        return [np.zeros(0, dtype=int)] * joints.q.shape[1]
+    return [_leaps(joints.t, q) for q in joints.q.T]
+
+
+def _leaps(t: Array, q: Array) -> NDArray[np.int_]:
+    """Return where a position (N,) leaps and back, faster by far than it ever goes besides, (K,)."""
+    step = np.diff(q)
+    speed = np.abs(step) / np.diff(t)
+    there, back = step[:-1], step[1:]
+    leap = (there * back < 0.0) & (np.minimum(np.abs(there), np.abs(back)) > MOVED)
+    at = np.flatnonzero(leap)
+    fast = np.minimum(speed[at], speed[at + 1])
+    order = np.argsort(-fast)
+    result, usual = at[:0], np.array(speed)
+    for k in order[: int(FEW * t.size)].tolist():
+        usual[at[k] : at[k] + 2] = 0.0
+        if fast[k] > CLEAR * usual.max():
+            result = at[order[: int(np.flatnonzero(order == k)[0]) + 1]]
+    return np.asarray(result + 1)

@@ -294,7 +294,9 @@ def _believed(
     factor, means = dispersion(parts, models.noise / rows.share, drawn)
     shift, share = np.zeros(regions.residual.size), 0.0
     for where, mean in zip(regions.spans, means, strict=True):
-        shift[where] = regions.whole[where] - regions.residual[where] + mean @ rows.columns[:, where]
+        shift[where] = (
+            regions.whole[where] - regions.residual[where] + mean @ rows.columns[:, where]
+        )
     if (square := float(shift @ shift)) > 0.0:
         share = min(max(float(regions.whole @ shift) / square, 0.0), 1.0)
     short = (1.0 - share) * models.mean

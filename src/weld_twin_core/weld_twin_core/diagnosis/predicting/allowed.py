@@ -293,9 +293,10 @@ def _believed(
     drawn = [Conditioning(rows, prior, width, models.noise).rooted for width in models.drawn]
     factor, means = dispersion(parts, models.noise / rows.share, drawn)
     shift, share = np.zeros(regions.residual.size), 0.0
-    for where, mean in zip(regions.spans, means, strict=True):
+    for region, mean in zip(np.unique(regions.labels), means, strict=True):
+        where = regions.labels == region
         shift[where] = (
-            regions.whole[where] - regions.residual[where] + mean @ rows.columns[:, where]
+            mean @ rows.columns[:, where] + regions.whole[where] - regions.residual[where]
         )
     if (square := float(shift @ shift)) > 0.0:
         share = min(max(float(regions.whole @ shift) / square, 0.0), 1.0)

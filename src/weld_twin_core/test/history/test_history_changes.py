@@ -192,6 +192,18 @@ def test_what_comes_back_at_the_same_postures_hides_no_step_between_them():
     assert found.std == pytest.approx(np.sqrt(0.2) * plain.std, rel=0.2)
 
 
+def test_postures_measured_twice_as_finely_are_the_same_postures():
+    first, *_ = weeks = year_of_programs(0, 0.8, 2)
+    finer = replace(
+        first,
+        covariance=np.linalg.inv(
+            4.0 * np.linalg.inv(first.covariance) - 3.0 * np.diag(first.prior_std**-2.0)
+        ),
+    )
+    assert first.same_postures(finer) and finer.same_postures(first)
+    assert not first.same_postures(weeks[-1])
+
+
 def framed(observations):
     """Return observations whose first six coordinates are those of the tool."""
     axes = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')

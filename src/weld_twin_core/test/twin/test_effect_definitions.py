@@ -599,6 +599,15 @@ def test_a_link_that_follows_a_temperature_grows_as_it_does(arm, make_recording)
             effect('link_warm_up', joint='j2', follows=wrong).check(arm)
 
 
+@pytest.mark.parametrize(('warmer', 'followed'), [(5.0, 1), (0.5, 0)])
+def test_a_warm_up_is_looked_for_by_a_temperature_that_varies(ur5, warmer, followed):
+    t = np.linspace(0.0, 60.0, 31)
+    q = np.zeros((31, 6))
+    view = View(ur5, t, t, q, q, temperature=20.0 + warmer * t / 60.0)
+    seeds = list(REGISTRY['joint_warm_up'].seeds(view, 'elbow_joint'))
+    assert sum(seed.follows is not None for seed in seeds) == followed
+
+
 def test_drives_that_all_trail_alike_look_like_a_late_clock_and_its_remedy_says_so(ur5):
     t = np.arange(0.0, 8.0, 0.01)
     q = 0.4 * np.sin(0.8 * t[:, None] + np.arange(6.0)) + [0.1, -1.2, 1.5, -1.0, -1.4, 0.3]

@@ -156,14 +156,15 @@ def without_astray(recording: Recording) -> Recording:
 
 def told_astray(recording: Recording, names: Sequence[str]) -> list[str]:
     """Return in sentences which joints' readings were left out of a recording, and when."""
-    t, q = recording.joints.t, recording.joints.q
-    return [
-        f'The reading of joint {names[i]!r} of {recording.name} leapt off its path and back '
-        f'{"once" if at.size == 1 else f"{at.size} times"}, first at t = {t[at[0]]:.4g} s to '
-        f'{q[at[0], i]:.4g}: left out.'
-        for i, at in enumerate(astray(recording.joints))
-        if at.size
-    ]
+    joints, out = recording.joints, list[str]()
+    for name, q, at in zip(names, joints.q.T, astray(joints), strict=False):
+        if at.size:
+            times = 'once' if at.size == 1 else f'{at.size} times'
+            out.append(
+                f'The reading of joint {name!r} of {recording.name} leapt off its path and back '
+                f'{times}, first at t = {joints.t[at[0]]:.4g} s to {q[at[0]]:.4g}: left out.'
+            )
+    return out
 
 
 def astray(joints: JointMotion) -> list[NDArray[np.int_]]:
@@ -182,9 +183,9 @@ def _leaps(t: Array, q: Array) -> NDArray[np.int_]:
     at = np.flatnonzero(leap)
     fast = np.minimum(speed[at], speed[at + 1])
     order = np.argsort(-fast)
-    result, usual = at[:0], np.array(speed)
-    for k in order[: int(FEW * t.size)].tolist():
+    count, usual = 0, np.array(speed)
+    for tried, k in enumerate(order[: int(FEW * t.size)].tolist(), start=1):
         usual[at[k] : at[k] + 2] = 0.0
         if fast[k] > CLEAR * usual.max():
-            result = at[order[: int(np.flatnonzero(order == k)[0]) + 1]]
-    return np.asarray(result + 1)
+            count = tried
+    return np.sort(at[order[:count]]) + 1

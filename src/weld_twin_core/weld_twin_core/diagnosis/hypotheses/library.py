@@ -127,10 +127,13 @@ class _Shelf:
         shown = [(seed, piece) for seed, piece in every if _shown(seed, piece)]
         if not shown:
             return
+        # Seeds of a kind on a joint differ in what bends them alone, and are believed alike.
+        alike = {piece.count: seed for seed, piece in shown}
+        prior = {count: _prior_precision(self.robot, seed, count) for count, seed in alike.items()}
         columns = []
-        for seed, piece in shown:
+        for _, piece in shown:
             self.pieces.append(piece)
-            self.normals.append(piece.normal() + _believed(self.robot, seed, piece.count))
+            self.normals.append(piece.normal() + prior[piece.count])
             columns.append(np.arange(self._count, self._count + piece.count))
             self._count += piece.count
         kept = tuple(seed for seed, _ in shown)
@@ -145,7 +148,7 @@ def _shown(seed: Effect, piece: Piece) -> bool:
     return bool(piece.peaks().max(initial=0.0) * reach > SHOWN)
 
 
-def _believed(robot: Robot, seed: Effect, count: int) -> Array:
+def _prior_precision(robot: Robot, seed: Effect, count: int) -> Array:
     """
     Return the prior precision of a seed's columns, shape (K, K): no machine has more than its range.
 

@@ -49,7 +49,7 @@ from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
-from .leftover import Predicted, known_noise, leftover
+from .leftover import Predicted, beyond_named, known_noise, leftover
 from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
 
 POSTURES = 100
@@ -92,7 +92,7 @@ def allowed(
     unseen = Unseen.of(problem, scale, Fit(model, rows.residual), precision)
     regions = unseen.by(posture_regions(problem))
     levers, parts = _levers(problem, model, scale), rows.parts(regions.labels)
-    whole = _believed(problem, rows, prior, models, parts, regions)
+    whole = _borne_out(problem, rows, prior, models, parts, regions)
     turning = ~np.asarray(model.robot.prismatic)
     given = _moved(problem, model), system.given, whole
     predicted = Predicted.of(regions, rows.columns, parts, levers, *given)
@@ -267,7 +267,7 @@ def _lost(problem: Problem, model: Model) -> Array:
     return np.asarray(np.max([np.ptp(shift, axis=0) for shift in shifts], axis=0))
 
 
-def _believed(
+def _borne_out(
     problem: Problem,
     rows: Rows,
     prior: Prior,
@@ -295,9 +295,7 @@ def _believed(
     shift, share = np.zeros(regions.residual.size), 0.0
     for region, mean in zip(np.unique(regions.labels), means, strict=True):
         where = regions.labels == region
-        shift[where] = (
-            mean @ rows.columns[:, where] + regions.whole[where] - regions.residual[where]
-        )
+        shift[where] = beyond_named(regions, rows.columns, where, mean)
     if (square := float(shift @ shift)) > 0.0:
         share = min(max(float(regions.whole @ shift) / square, 0.0), 1.0)
     short = (1.0 - share) * models.mean

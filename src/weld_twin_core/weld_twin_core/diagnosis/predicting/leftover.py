@@ -163,9 +163,17 @@ def _by_others(unseen: Unseen, columns: Array, parts: Sequence[Products], given:
         out = labels == region
         mean, covariance = given(part)
         ways[:-1, out] = _ways(covariance, columns[:, out])
-        # The mean is counted from the fit to all rows, the error from the fit to the others.
-        ways[-1, out] = mean @ columns[:, out] + unseen.whole[out] - unseen.residual[out]
+        ways[-1, out] = beyond_named(unseen, columns, out, mean)
     return ways
+
+
+def beyond_named(unseen: Unseen, columns: Array, out: NDArray[np.bool_], mean: Array) -> Array:
+    """
+    Return by how much a mean given other rows foretells some rows beyond the named causes alone.
+
+    The mean is counted from the fit to all rows, what the named causes leave from that to the others.
+    """
+    return np.asarray(mean @ columns[:, out] + unseen.whole[out] - unseen.residual[out])
 
 
 def _ways(covariance: Array, columns: Array) -> Array:

@@ -33,7 +33,7 @@ from .rows import rows
 from .set_up import gravity, orientation, parted, setup
 from .slips import Slip
 from .stamps import clocks, stamps, streams, velocities_checked
-from .stuck import stuck, told_astray, without_astray
+from .stuck import stuck, without_astray
 from .touches import touches
 
 
@@ -112,7 +112,8 @@ class Examined:
         for each in self.mistakes:
             if each.mend is not None and ONE not in (as_entry(each.mend) or {}):
                 out = each.mend(out)
-        return tuple(without_astray(velocities_checked(one)) for one in out.recordings)
+        names = out.robot.joint_names
+        return tuple(without_astray(velocities_checked(one), names)[0] for one in out.recordings)
 
 
 def examine(
@@ -165,11 +166,9 @@ def examine(
 
 def _astray(given: Given) -> tuple[list[Check], Given]:
     """Return which joints' readings strayed by themselves, and what was given without them."""
-    names = given.robot.joint_names
-    said = [one for own in given.recordings for one in told_astray(own, names)]
-    kept = tuple(without_astray(own) for own in given.recordings)
-    out = [Check('joint readings', 'warning', sentence) for sentence in said]
-    return out, replace(given, recordings=kept)
+    each = [without_astray(own, given.robot.joint_names) for own in given.recordings]
+    out = [Check('joint readings', 'warning', sentence) for _, said in each for sentence in said]
+    return out, replace(given, recordings=tuple(kept for kept, _ in each))
 
 
 def _first(mistakes: Sequence[Finding], *, applied: bool) -> list[Check]:

@@ -144,27 +144,25 @@ def _when(recording: Recording, start: int, end: int) -> str:
     return f'from t = {t[start]:.4g} to {t[end]:.4g} s'
 
 
-def without_astray(recording: Recording) -> Recording:
-    """Return it without the samples of a motion in which a joint's reading strays by itself."""
-    joints, out = recording.joints, np.unique(np.concatenate(astray(recording.joints)))
+def without_astray(
+    recording: Recording, names: Sequence[str]
+) -> tuple[Recording, tuple[str, ...]]:
+    """Return it without samples of a motion at which a joint's reading strays alone, and sentences."""
+    joints = recording.joints
+    each = astray(joints)
+    out = np.unique(np.concatenate(each))
     if not out.size:
-        return recording
+        return recording, ()
     qd = None if joints.qd is None else np.delete(joints.qd, out, axis=0)
     t, q = np.delete(joints.t, out), np.delete(joints.q, out, axis=0)
-    return replace(recording, joints=replace(joints, t=t, q=q, qd=qd))
-
-
-def told_astray(recording: Recording, names: Sequence[str]) -> list[str]:
-    """Return in sentences which joints' readings were left out of a recording, and when."""
-    joints, out = recording.joints, list[str]()
-    for name, q, at in zip(names, joints.q.T, astray(joints), strict=False):
-        if at.size:
-            times = 'once' if at.size == 1 else f'{at.size} times'
-            out.append(
-                f'The reading of joint {name!r} of {recording.name} leapt off its path and back '
-                f'{times}, first at t = {joints.t[at[0]]:.4g} s to {q[at[0]]:.4g}: left out.'
-            )
-    return out
+    said = (
+        f'The reading of joint {name!r} of {recording.name} leapt off its path and back '
+        f'{"once" if at.size == 1 else f"{at.size} times"}, first at t = {joints.t[at[0]]:.4g} s to '
+        f'{own[at[0]]:.4g}: left out.'
+        for name, own, at in zip(names, joints.q.T, each, strict=False)
+        if at.size
+    )
+    return replace(recording, joints=replace(joints, t=t, q=q, qd=qd)), tuple(said)
 
 
 def astray(joints: JointMotion) -> list[NDArray[np.int_]]:

@@ -623,6 +623,11 @@ def test_drives_that_all_trail_alike_look_like_a_late_clock_and_its_remedy_says_
     assert 'trail' not in effect('time_delay', delay=-0.015).remedy(ur5)
 
 
+def test_an_effect_without_words_of_its_own_is_told_with_four_digits(ur5):
+    told = effect('measurement_noise', sigma=0.00123456).remedy(ur5)
+    assert 'sigma 0.001235 m' in told
+
+
 def test_stations_that_are_only_counted_show_no_warm_up(arm, make_recording):
     stations, kind = make_recording(arm, 30, static=True), REGISTRY['link_warm_up']
     counted, timed = (

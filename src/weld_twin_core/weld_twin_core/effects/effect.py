@@ -357,8 +357,9 @@ class Effect(ABC):
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend of a nominal robot where it was found: one sentence with its size."""
+        digits: Any = {'float_kind': '{:.4g}'.format}
         sizes = ', '.join(
-            f'{p.name} {np.array2string(np.asarray(getattr(self, p.name)), precision=4)} '
+            f'{p.name} {np.array2string(np.asarray(getattr(self, p.name)), formatter=digits)} '
             f'{self.unit(p, robot)}'
             for p in self.parameters
         )

@@ -153,7 +153,7 @@ def _plain(value: Any) -> str:
 def checks_section(page: Content) -> Html:
     """Return the checks of the data, those that need attention first."""
     diagnosis = page.diagnosis
-    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 1))
+    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER[check.level])
     items = [
         tag(
             'li',

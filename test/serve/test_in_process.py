@@ -5,6 +5,7 @@
 import asyncio
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 from page_text import page_text
@@ -75,18 +76,29 @@ class Visitor:
 
 
 @pytest.fixture
-def app(tmp_path):
-    """Return an application in which nobody works, so that everything waits."""
+def settings(tmp_path):
     from weld_twin_report.serve import Settings
-    from weld_twin_report.serve.access import Doors
-    from weld_twin_report.serve.app import make_app
+
+    return Settings(tmp_path, names=('cell.example',), token='right', workers=0, upload=8000,
+                    own=3, proxy=True)  # fmt: skip
+
+
+@pytest.fixture
+def queue(settings):
     from weld_twin_report.serve.queue import Queue
 
-    settings = Settings(tmp_path, names=('cell.example',), token='right', workers=0, upload=8000,
-                        own=3, proxy=True)  # fmt: skip
     queue = Queue(settings)
-    yield make_app(settings, queue, Doors())
+    yield queue
     queue.stop()
+
+
+@pytest.fixture
+def app(settings, queue):
+    """Return an application in which nobody works, so that everything waits."""
+    from weld_twin_report.serve.access import Doors
+    from weld_twin_report.serve.app import make_app
+
+    return make_app(settings, queue, Doors())
 
 
 def test_who_is_let_in(app, kept):
@@ -155,6 +167,23 @@ def test_what_is_no_recording_is_refused_in_a_sentence(app, tmp_path, kept):
     said = [one.ask('/recordings', *form(**how)).splitlines()[:11] for how in NO_RECORDINGS]
     kept('no_recordings', '\n\n'.join('\n'.join(lines) for lines in said) + '\n')
     assert not list((tmp_path / 'jobs').iterdir())
+
+
+@pytest.mark.parametrize(
+    ('state', 'cell', 'asked'),
+    [('done', 'line 3', True), ('done', '', False), ('waiting', 'line 3', False)],
+)
+def test_what_is_done_for_a_cell_goes_into_its_history_once_more(app, queue, state, cell, asked):
+    one = Visitor(app, authorization='Bearer right')
+    one.ask('/recordings', *form(files=TABLE, cell=cell))
+    mine = one.last
+    (job,) = queue._jobs.values()
+    queue._put(replace(job, state=state))
+    one.ask(f'{mine}/history', b'', FORM)
+    assert queue.get(job.key, job.user).said.startswith('not in the history: ') is asked
+    queue.remove(job)
+    queue.into_history(job)  # what was deleted meanwhile does not come back
+    assert queue.get(job.key, job.user) is None and not queue.folder(job).exists()
 
 
 def test_two_diagnoses_for_one_program_are_refused_in_a_sentence(app, tmp_path):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What stamps tell: gaps of a beat are counted, what is no beat is let be, jumps are no gaps."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,11 @@ from weld_twin_nodes.streams.stamp_watch import (
     REGULAR,
     RUSH,
     SILENT,
+    SPAN,
+    UNPAIRED,
+    ClockWatch,
     StampWatch,
+    Stream,
 )
 
 S = 1_000_000_000
@@ -46,6 +52,28 @@ def without(*spans, share=0.0):
 
 def jittered(share):
     return STAMPS + (RNG.normal(0.0, share, N) * STEP).astype(np.int64)
+
+
+def test_a_stream_keeps_some_seconds_of_samples_that_are_not_too_close():
+    stream, here = Stream(0.02), np.zeros(3)
+    for k in range(3000):  # at 250 Hz; every fifth is 20 ms after the one before
+        stream.add(S + 4_000_000 * k, here, 50.0 + 0.004 * k)
+    kept = [sample.stamp for sample in stream.samples]
+    assert set(np.diff(kept)) == {20_000_000} and kept[-1] > stream.newest - 20_000_000
+    assert kept[-1] - kept[0] == pytest.approx(SPAN * S, abs=20_000_000)
+    assert stream.newest == S + 4_000_000 * 2999 and stream.ahead == pytest.approx(-49.0)
+    assert stream.in_real_time and stream.alive(62.9) and not stream.alive(63.6)
+    stream.add(2 * S, here, 62.0)  # a clock that was set back
+    assert [sample.stamp for sample in stream.samples] == [2 * S]
+
+
+@pytest.mark.parametrize(('pace', 'real'), [(0.6, False), (0.8, True), (1.3, True), (1.5, False)])
+def test_stamps_pass_as_time_does_or_faster_or_slower(pace, real):
+    stream = Stream(0.02)
+    for k in range(100):
+        assert not stream._arrivals or k > 74 or not stream.in_real_time  # in less than 0.75 s
+        stream.add(S + round(10_000_000 * pace * k), np.zeros(3), 0.01 * k)
+    assert stream.in_real_time is real
 
 
 @pytest.mark.parametrize('kept', [without(share=0.03), without(share=0.3), without((100, 900))])
@@ -138,3 +166,48 @@ def test_a_stream_off_the_beat_more_often_than_allowed_tells_nothing():
         steps[2000] = 4.0
         stamps = S + np.cumsum(steps * STEP).astype(np.int64)
         assert (seen(stamps, stamps / S)[0] > 0) == tells
+
+
+def watched(ahead=0.0, rate=0.0, pairs=True, seconds=12):
+    """Return what is told, second by second, of one way that is stamped by two clocks."""
+    watch, told, paired = ClockWatch(), [], 0
+    for k in range(250 * seconds):
+        t = k / 250
+        place = np.array([0.1 * np.sin(0.9 * t), 0.05 * np.cos(1.7 * t), 0.0])
+        watch.twin.add(S + round(t * S), place, t)
+        if k % 5 == 0:
+            watch.measured.add(S + round((t + ahead + rate * t) * S), place, t)
+            paired += pairs
+        if k % 250 == 249:
+            told.append(watch.look(t, paired, 3, 1))
+    return told
+
+
+LATE = ', or every joint trails by as much'
+UNMET = 'no measurement meets a pose of the twin: 3 wait, 1 are dropped'
+
+
+@pytest.mark.parametrize(
+    ('how', 'last'),
+    [
+        ({}, ''),
+        ({'ahead': 0.05}, f'measurements are 0.050 s ahead of the joints{LATE}'),
+        ({'ahead': -0.05}, 'measurements are 0.050 s behind the joints'),
+        ({'ahead': 0.01}, ''),  # as servo loops trail
+        ({'ahead': 0.7}, 'measurements are 0.70 s ahead of the joints'),
+        ({'pairs': False}, UNMET),
+        ({'pairs': False, 'ahead': -5.0}, f'{UNMET}; measurements are 5.0 s behind the joints'),
+    ],
+)
+def test_two_clocks_are_told_apart_by_stamps_or_by_the_motion(how, last):
+    told = watched(**how)
+    assert told[-1] == last
+    if how == {'pairs': False}:
+        assert told == [''] * (round(UNPAIRED) + 1) + [UNMET] * (11 - round(UNPAIRED))
+
+
+def test_a_clock_that_runs_faster_is_told_with_its_rate():
+    told = watched(rate=3e-4, seconds=45)[-1]
+    assert re.match(
+        r'the clock of the measurements drifts by \+(29\d|30\d) ppm .*, \+\d\.\d ms in', told
+    )

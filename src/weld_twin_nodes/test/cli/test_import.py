@@ -5,14 +5,16 @@
 import csv
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import done, refused, weld_twin
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core import catalog, forward
+from weld_twin_core import DataError, catalog, forward
 from weld_twin_msgs_py.bags import read_recording
+from weld_twin_nodes.cli.commands.detect import _joints
 
 ROBOT = catalog.load('ur5')
 
@@ -186,6 +188,28 @@ def test_a_board_in_images_becomes_a_table_of_pixels(tmp_path):
     for row in rows:
         seen = [float(row['u [px]']), float(row['v [px]'])]
         assert np.linalg.norm(truth[row['image']][int(row['point'])] - seen) < 0.6
+
+
+@pytest.mark.parametrize(
+    ('table', 'cells'),
+    [
+        ('', ([], [[], []])),
+        ('j,k\n1,2\n3,4\n', (['j', 'k'], [['1', '2'], ['3', '4']])),
+        ('j,image,k\n1,a,2\n3,b.png,4\n', (['j', 'k'], [['3', '4'], ['1', '2']])),
+        ('j,k\n1,2\n', 'has 1 rows for 2 images'),
+        ('image,j\na,1\nc,2\n', "has no row of image 'b.png'"),
+    ],
+)  # fmt: skip
+def test_joints_beside_pixels_are_those_of_the_image_by_its_name_or_its_place(
+    table, cells, tmp_path
+):
+    file, images = tmp_path / 'joints.csv', [Path('b.png'), Path('a.png')]
+    file.write_text(table)
+    if isinstance(cells, tuple):
+        assert _joints(str(file) if table else '', images) == cells
+        return
+    with pytest.raises(DataError, match=cells):
+        _joints(str(file), images)
 
 
 def test_what_is_no_board_file_is_told_in_one_sentence(tmp_path):

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from weld_twin_msgs_py.assembly.joint_states import JointStates
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import BY_NAME
 from weld_twin_nodes.live.deviation_markers import DeviationLines, colors
-from weld_twin_nodes.live.health import ERROR, OK, STALE, WARN, Health
+from weld_twin_nodes.live.goals import GoalAudit
+from weld_twin_nodes.live.health import ERROR, OK, STALE, WARN, Health, Input
+from weld_twin_nodes.live.telling_node import OVER, Losses
 
 CONFIG = Path(__file__).parents[4] / 'src/weld_twin_nodes/config'
 ROBOT = load('ur5')
@@ -109,6 +112,41 @@ def test_the_node_itself_tells_what_lasts_each_time_and_what_happened_once():
 
 def state(names, q, ns=NS, qd=None):
     return bag_messages().joint_state(ns, list(names), np.asarray(q), qd)
+
+
+def test_a_loss_is_told_with_its_number_and_at_its_end_or_that_of_the_node():
+    state = Input('/joint_states', True, 1.0)
+    losses, came = Losses(state), [k for k in range(1000) if not 500 <= k < 600]
+    for k in came:
+        state.stamps.add(NS + 4_000_000 * k, 0.004 * k)
+    assert losses.ended() == []
+    told = losses.look(4.0) + losses.look(5.0)
+    assert told == [losses.telling] and '100 missing messages' in losses.telling
+    assert 'one is due every 4 ms' in losses.telling
+    assert losses.ended() == ['/joint_states: 100 messages are missing in all']
+    over = losses.look(4.1 + OVER)
+    assert over == ['/joint_states: no more messages go missing; 100 are missing in all']
+    assert losses.ended() == []
+
+
+def test_a_goal_that_goes_nowhere_is_warned_of_and_what_becomes_of_others_is_no_warning():
+    levels, told, sent = [], [], []
+    logger = SimpleNamespace(
+        warning=lambda _: levels.append('warning'), info=lambda _: levels.append('info')
+    )
+    node = SimpleNamespace(
+        offer=lambda *_, **__: SimpleNamespace(publish=lambda each: sent.append(each.data)),
+        setting=lambda _: '',
+        get_logger=lambda: logger,
+        health=SimpleNamespace(say=told.append),
+    )
+    audit = GoalAudit(node)
+    audit.settle('m', None, 'passed', '')
+    audit.settle('m', None, 'refused', 'too far')
+    audit.settle('m', None, 'corrected', '', below='no controller')
+    assert levels == ['info', 'warning', 'warning']
+    assert told == ['goal refused: too far', 'goal rejected by the controller: no controller']
+    assert [json.loads(line)['why'] for line in sent] == ['', 'too far', 'no controller']
 
 
 def test_joints_spread_over_publishers_are_put_together_by_equal_stamps():

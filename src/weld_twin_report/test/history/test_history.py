@@ -21,7 +21,7 @@ from weld_twin_core.twin.directions import GIVE
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_report.history import Database, entry_of
 from weld_twin_report.history.entry import Entry
-from weld_twin_report.history.words import changed, observations, sentence
+from weld_twin_report.history.words import changed, forecast, observations, sentence
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -103,14 +103,29 @@ def test_another_robot_is_another_cell(elbow_found, url):
     database.close()
 
 
-def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
-    def entry(week, names, value):
-        tool, std = np.eye(4), np.full(len(names), 1e-6)
-        of = ('ur5', '0' * 16, f'week {week}', 'none', 0.9, 1e-4, 3e-5, 1e-4, [])
-        at = MONDAY + timedelta(weeks=week)
-        return Entry(at, *of, names, np.array(value), 1e2 * std, np.diag(std**2), tool)
+ZERO = 'joint_offset elbow_joint 0'
 
-    zero, give = 'joint_offset elbow_joint 0', f'{GIVE}joint 3'
+
+def entry(week, names, value):
+    tool, std = np.eye(4), np.full(len(names), 1e-6)
+    of = ('ur5', '0' * 16, f'week {week}', 'none', 0.9, 1e-4, 3e-5, 1e-4, [])
+    at = MONDAY + timedelta(weeks=week)
+    return Entry(at, *of, names, np.array(value), 1e2 * std, np.diag(std**2), tool)
+
+
+def test_what_moves_a_little_every_week_is_told_by_the_week_with_the_weeks_that_are_left():
+    entries = [entry(week, (ZERO,), (2e-5 * week,)) for week in range(13)]
+    seen = observations(entries)
+    (change,) = result = changed(entries, seen)
+    assert 'elbow_joint: moves by 0.0200' in sentence(change)
+    until = forecast(change, seen, result, {'joint_offset': 2e-5 * 32.0})
+    assert until['weeks'] == pytest.approx(20.0, abs=0.5)
+    assert until['weeks_5'] <= until['weeks'] <= until['weeks_95']
+    assert forecast(change, seen, result, {'tool_pose': 1.0}) is None
+
+
+def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
+    zero, give = ZERO, f'{GIVE}joint 3'
     entries = [entry(week, (zero,), (0.0,)) for week in range(3)]
     entries += [entry(week, (zero, give), (0.0, 5e-5)) for week in range(3, 6)]
     assert changed(entries, observations(entries)) == ()

@@ -17,6 +17,7 @@ from command_line import done, refused
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.offline.environment import environment
 from weld_twin_nodes.offline.output_directory import new_directory, write_owned
 
 LIST = '.weld_twin_files.json'
@@ -397,3 +398,11 @@ def test_a_result_whose_folder_is_deleted_meanwhile_is_not_told_as_written(tmp_p
         write_text(place / 'result.json', '{}')
 
     assert not list(tmp_path.glob('*out*/*'))
+
+
+def test_variables_of_the_environment_are_set_for_a_block_and_then_as_before(monkeypatch):
+    monkeypatch.setenv('HAD', 'its own')
+    monkeypatch.delenv('NEW', raising=False)
+    with environment(HAD='other', NEW='some'):
+        assert (os.environ['HAD'], os.environ['NEW']) == ('other', 'some')
+    assert os.environ['HAD'] == 'its own' and 'NEW' not in os.environ

@@ -13,7 +13,7 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core import Robot, effect_from_mapping, load
-from weld_twin_core.diagnosis.result import Candidate, Site, Unexplained
+from weld_twin_core.diagnosis.result import Candidate, Cause, Site, Unexplained
 from weld_twin_core.diagnosis.verdict.decision import UNEVEN
 from weld_twin_core.effects import REGISTRY
 from weld_twin_nodes.wording.quantities import (
@@ -154,6 +154,32 @@ def test_what_remains_beside_a_name_is_not_told_as_above_the_noise_that_is_in_it
     told, _ = verdict(replace(case, status='unknown', gap=gap, unexplained=remains))
     words = '0.073 mm remains that no effect in the library explains; measuring noise alone is 0.041 mm'
     assert words in plain(told)
+
+
+def test_what_is_left_beside_a_name_is_told_with_its_place():
+    case = diagnoses.backlash()
+    assert 'Beside that' not in verdict(case)[1]
+    rest = Cause((('base', 0.97),), (('time', 0.9),), (), 0.23, (0.2, 0.3), rest=True)
+    said = plain(verdict(replace(case, causes=(*case.causes, rest)))[1])
+    assert 'Beside that, 23 % of the squared gap has no name yet: ' in said and 'base' in said
+
+
+def test_of_an_unknown_cause_is_told_what_it_depends_on_or_that_it_shows_nothing():
+    case = replace(diagnoses.backlash(), status='unknown', effects=(), causes=())
+    for structure, words in (
+        ((), 'What remains is above the noise, but shows no simple dependence.'),
+        (('speed',), 'What remains depends on speed.'),
+        (('a', 'b', 'c', 'd'), 'What remains depends on a, b and c.'),
+    ):
+        remains = replace(case.unexplained, above_noise=True, structure=structure)
+        first, second = verdict(replace(case, unexplained=remains, reasons=('too short',)))
+        assert first.startswith('No effect in the library') and second == words
+    still = replace(case.unexplained, above_noise=False, structure=())
+    first, second = verdict(replace(case, unexplained=still, reasons=('too short',)))
+    assert second == 'Too short.'
+    named = replace(case, effects=diagnoses.backlash().effects, unexplained=still)
+    first, second = verdict(replace(named, reasons=('too short',)))
+    assert first.endswith('; what else is at work has no name.') and second == 'Too short.'
 
 
 def test_a_share_is_told_of_what_it_is_a_share_of():

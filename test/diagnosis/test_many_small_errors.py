@@ -13,6 +13,7 @@ from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.answer.named_effects import _named_sets
 from weld_twin_core.diagnosis.evidence import Evidence, Verdict
+from weld_twin_core.diagnosis.many import fitted_together
 from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import _Case, weighed_families
 from weld_twin_core.diagnosis.result import Site, Structure
@@ -44,6 +45,25 @@ def test_two_narrow_lines_are_found_where_they_are_and_nowhere_else():
         problem, model.with_found(dense(model.robot)), known_scale(problem), Beliefs()
     )
     assert told(found) == {'elbow_joint': [256.0], 'wrist_2_joint': [131.0]}
+
+
+@pytest.mark.parametrize(
+    ('dense', 'count', 'anew'), [(True, 150, True), (True, 300, False), (False, 3, False)]
+)
+def test_sizes_of_many_are_learned_anew_without_a_part_unless_that_takes_minutes(
+    monkeypatch, dense, count, anew
+):
+    learned, parts = [], SimpleNamespace(whole=np.full(3, 2.0), rms=np.mean)
+    ways = SimpleNamespace(every_way=lambda: [parts])
+    monkeypatch.setattr(fitted_together.Unseen, 'of', lambda *_: ways)
+    monkeypatch.setattr(
+        fitted_together, 'predicted', lambda *_: learned.append(1) or np.full(3, 5.0)
+    )
+    final = SimpleNamespace(coordinates=np.zeros(count), model=None)
+    few = dict.fromkeys(('problem', 'scale', 'precision'))
+    result = SimpleNamespace(dense=dense, final=final, work=SimpleNamespace(beliefs=None), **few)
+    assert fitted_together.unseen_rms(result) == (5.0 if anew else 2.0)
+    assert len(learned) == anew
 
 
 def test_noise_alone_has_no_lines():

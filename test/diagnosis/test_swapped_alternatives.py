@@ -118,8 +118,10 @@ def test_a_single_wave_gives_way_to_one_of_another_order(order, wrong):
     assert [e.order for e in kept.model.found] == [order]
 
 
-@pytest.mark.parametrize('back', [0.0, 0.4])
-def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(monkeypatch, back):
+@pytest.mark.parametrize(('back', 'rounds'), [(0.0, 3), (0.4, 3), (0.0, 1)])
+def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
+    monkeypatch, back, rounds
+):
     problem, model = tiny(TRUE)
     first = effect('gear_ratio', joint='elbow_joint')
     work, now = search.workspace(problem, model.with_found((first, TRUE[1])), (), Beliefs())
@@ -142,8 +144,10 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
 
     monkeypatch.setattr(search, 'fit_alternatives', chosen)
     monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets: (now, ()))
-    kept, _ = search.settled(work, now, str)
+    monkeypatch.setattr(search, 'ROUNDS', rounds)
+    kept, candidate_sets = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
+    assert len(candidate_sets) == len(kept.model.found)  # of each, however late one was exchanged
 
 
 @pytest.mark.parametrize('source', ['shoulder_lift_joint', 'wrist_1_joint'])

@@ -258,6 +258,15 @@ def test_squared_errors_are_metres_of_the_trusted_samples_whatever_their_weight(
     np.testing.assert_allclose(unseen.squares(found.residual), expected, rtol=1e-9)
     assert unseen.rms(found.residual) == pytest.approx(np.sqrt(expected.mean()))
     assert unseen.trusted_labels().size == expected.size
+    turned = (problem.residuals(model)[0][3:] ** 2).sum(axis=0)[weights >= TRUSTED]
+    assert unseen.turn_rms(found.residual) == pytest.approx(np.sqrt(turned.mean()))
+
+
+def test_points_without_orientation_have_no_error_of_it():
+    problem, model = tiny((), count=30, turned=False)
+    scale = known_scale(problem)
+    found = fit(problem, model, scale)
+    assert Unseen.of(problem, scale, found, np.zeros(0)).turn_rms(found.residual) is None
 
 
 def test_what_many_samples_do_is_no_outlier():

@@ -6,6 +6,7 @@ import random
 import re
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from weld_twin_msgs_py.programs import (
     rewritten,
     to_moves,
 )
+from weld_twin_msgs_py.programs.build import quadrants
 from weld_twin_msgs_py.programs.source import (
     ABB_POSE,
     FANUC_POSE,
@@ -899,3 +901,18 @@ def test_broken_programs_are_refused_in_words_or_change_in_moved_points_alone(la
         check_written(program, read(language, again), points)
         assert [re.sub(NUMBER, '', t) for t in again] == [re.sub(NUMBER, '', t) for t in texts]
     assert 0.05 * FUZZED < refused < 0.95 * FUZZED
+
+
+@pytest.mark.parametrize('external', [(), ('track',)])
+def test_a_confdata_tells_the_quarter_turns_of_axes_1_4_and_6_within_half_a_degree(external):
+    """Others may stand anywhere, and what its last number means depends on the arm."""
+    posture = np.array([10.0, 80.0, -20.0, -100.0, 200.0, 190.0])
+    off = {0: (-10.4, 80.4), 3: (-80.4, 10.4), 5: (-10.4, 80.4)}
+    within = [posture + turn * np.eye(6)[axis] for axis in off for turn in off[axis]]
+    beyond = [posture + 1.02 * turn * np.eye(6)[axis] for axis in off for turn in off[axis]]
+    anywhere = [posture + 90.0 * np.eye(6)[axis] for axis in (1, 2, 4)]
+    q = np.radians([*within, *anywhere, *beyond])
+    q = np.hstack([np.full((len(q), len(external)), 7.0), q])
+    controller, suits = SimpleNamespace(external=external), quadrants([0, -2, 2, 5])
+    assert suits(controller, q).tolist() == [True] * 9 + [False] * 6
+    assert suits(controller, q[:, :-1]).all()  # an arm of five axes has no such quarters

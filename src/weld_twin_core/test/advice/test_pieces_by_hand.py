@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from weld_twin_core import JointMotion, Measurements, Recording, Signal, load
-from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, _alone, candidates
+from weld_twin_core.diagnosis.advice.candidates import (
+    MASS,
+    PRESS,
+    RISE,
+    STAY,
+    Piece,
+    _alone,
+    candidates,
+)
 from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns, _longer
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
 from weld_twin_core.diagnosis.advice.next_touches import MOST, _Option
@@ -289,6 +297,12 @@ def test_what_needs_a_hand_or_another_set_up_is_offered_where_that_may_be(proble
     changing = {'warm_up', 'payload_swap', 'longer_tool', 'moved_instrument'}
     assert set(could_be(problem)) == {'path', 'stations', 'bidirectional'} | changing
     assert set(could_be(problem, set_up=False)) == {'stations', 'bidirectional'}
+
+
+def test_every_station_takes_its_time_the_last_one_as_well(problem):
+    stations = could_be(problem)['stations']
+    plan = Plan(stations, tuple(range(len(stations.pieces)))[:4])
+    assert 60.0 * plan.robot_minutes == pytest.approx(STAY * plan.motion().t.size)
 
 
 def test_a_tool_that_is_pressed_is_pressed_along_each_axis_in_turn(problem):

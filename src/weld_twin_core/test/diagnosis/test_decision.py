@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.evidence import Alternative, Evidence, Left, Scatter
+from weld_twin_core.diagnosis.evidence import Alternative, Evidence, Left, Scatter, beyond_doubt
 from weld_twin_core.diagnosis.result import Family, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import decide
 
@@ -375,3 +375,20 @@ def test_joints_at_which_a_kind_is_one_error_are_one_set():
 def test_beliefs_cannot_be_changed_by_accident():
     with pytest.raises(AttributeError):
         Beliefs().sure = 0.5
+
+
+@pytest.mark.parametrize(
+    ('gain', 'sure', 'chance', 'there'),
+    [
+        (0.033, 3.2, 0.0, True),
+        (0.027, 3.2, 0.0, False),
+        (0.033, 2.8, 0.0, False),
+        (0.16, 1.6, 0.0, True),  # much, though few parts hold all of it
+        (0.16, 1.4, 0.0, False),
+        (0.14, 1.6, 0.0, False),
+        (0.16, 5.0, 0.2, False),
+    ],
+)
+def test_a_structure_counts_by_how_much_it_takes_off_and_how_surely(gain, sure, chance, there):
+    found = Structure(1e-4, gain, sure, ('time',), chance)
+    assert beyond_doubt(found, Beliefs()) is there

@@ -114,6 +114,18 @@ def test_stops_of_a_motion_are_measured_after_they_settled():
     np.testing.assert_allclose(found.poses[0].command, on_circle(0.0), atol=1e-12)
 
 
+@pytest.mark.parametrize(('rest', 'whole'), [(0.0, False), (1.5, True)])
+def test_a_path_that_was_passed_twice_after_a_way_to_it_is_repeated(rest, whole):
+    """Where the arm rests at its start the path begins there, else at some place on it."""
+    cycles = there_and_back([0.0, 0.0], rest=rest).joints
+    q = np.concatenate([np.linspace(-0.8, 0.0, 300), cycles.q[:, 0]])
+    motion = JointMotion(0.01 * np.arange(q.size), q[:, None])
+    recording = Recording('twice', motion, Measurements(motion.t, on_circle(q)))
+    found = path_cycles(recording, TURNTABLE)
+    assert len(found.spans) == 2
+    assert all((each.end - each.start > 9.0) is whole for each in found.spans)
+
+
 @pytest.mark.parametrize('late', [0.0, 0.08])
 @pytest.mark.parametrize('rest', [0.0, 1.5])
 def test_path_accuracy_and_repeatability_are_what_was_put_in(late, rest):

@@ -160,7 +160,10 @@ def test_stack_counts_across_and_stickout_apart():
     assert (found.inside_across.low, found.inside_across.high) == pytest.approx(wanted)
     median = found.percentiles['max_m'][2]
     assert median[0] == pytest.approx(5e-4)
-    assert median[1] < median[0] < median[2]
+    for told, percent in zip(found.percentiles['max_m'], (5, 25, 50, 75, 90, 95, 99), strict=True):
+        assert told[0] == pytest.approx(np.percentile(across, percent))
+        low, high = stats.binom.ppf([0.025, 0.975], 100, percent / 100.0).astype(int)
+        assert told[1:].tolist() == [across[low], across[min(high, 99)]]
 
 
 def test_halved_tolerances_halve_the_deviation_of_a_linear_stack(study):

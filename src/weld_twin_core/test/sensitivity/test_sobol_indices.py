@@ -218,6 +218,57 @@ def test_claims_of_identities_are_measured_as_such(case, ur5):
     assert 0.0 < case['play_smooth_m'] < 2.0 * 0.5 * 5.3e-4 * case['S_theta_max_m']
 
 
+JUDGED = {
+    'initialization_constant': ('init_spread init_turn_spread', (9e-4, 9e-4), (9e-4, 0.5), (2e-3, 0)),
+    'initialization_unit': (
+        'init_S init_growth init_turn_S_m',
+        (1.0009, -9e-4, 0.96), (0.9991, 9e-4, 1.06), (1.0, -2e-3, 1.0),
+    ),
+    'smooth_below_aggressive': ('offset_ratio lag_ratio', (1.002, 1), (1, 1.002), (1.0009, 1.0009)),
+    'smooth_cumulative': ('offset_mean_ratio', (1.002,), None, (1.0009,)),
+    'smooth_mitigates': ('plan_geometry_ratio plan_lag_ratio', (1.02, 1.02), (1, 1.02), (1.02, 1)),
+    'backlash_local': ('local_share_play local_share_written', (0.95, 0), (0.85, 0.95), (0.85, 0.85)),
+    'backlash_reversals': (
+        'more_reversals_mean_play more_reversals_mean_written', (1.2, 1), (1, 1.2), (1, 1)
+    ),
+    'backlash_profile': (
+        'play_peak_ratio play_spread_aggressive_m play_spread_smooth_m',
+        (1.1, 0, 1), (1, 2.2, 1), (1, 1.8, 1),
+    ),
+    'proportional': ('linear_departure_max linear_departure_min', (9e-3, -9e-3), None, (0, -0.012)),
+    'nonlinear_growth': ('linear_departure_max', (0.012,), None, (9e-3,)),
+    'tenth_degree': ('tenth_degree_m', (1.2e-4,), None, (9e-5,)),
+    # a degree at 60 mm is 1.05 mm
+    'angle_above_length': (
+        'S_theta_least_m S_theta_max_m S_a_max', (1.1, 2, 1), (0, 0.06, 1), (0, 0.055, 1)
+    ),
+    'length_bias': ('S_a_departure S_a_spread', (9e-4, 9e-4), None, (9e-4, 1.2e-3)),
+    'length_place': ('S_a_max S_a_min', (1.012, 1), None, (1.009, 1)),
+    'condition': ('condition_rank condition_rank_anywhere', (0.6, 0.6), (0.6, 0.4), (0.4, 0.6)),
+    'combined': ('combined_exceeds', (0.6,), None, (0.4,)),
+    'drift_linear': (
+        'drift_exponent_angular drift_spread_angular', (0.96, 0), (1.06, 0.06), (1.06, 0.04)
+    ),
+    'drift_superlinear': ('drift_exponent_combined', (1.06,), None, (1.04,)),
+    'ranking': (
+        'rank_holds unit_angular unit_backlash unit_length unit_initial',
+        (1, 0, 0, 0, 0), (0, 3, 2, 1, 1), (0, 3, 2, 1, 1.1)
+    ),
+}  # fmt: skip
+"""Measurements of a claim with which it holds, holds under its condition, and does not hold."""
+
+
+@pytest.mark.parametrize('key', JUDGED)
+def test_a_claim_is_judged_by_its_measurements_on_either_side(key, case):
+    names, *cases = JUDGED[key]
+    for values, verdict in zip(cases, ('holds', 'holds when ', 'does not hold'), strict=True):
+        if values is not None:
+            measured = case | dict(zip(names.split(), map(float, values), strict=True))
+            (claim,) = (c for c in judge({CaseName('a', 'b'): measured}) if c.key == key)
+            assert claim.verdict.startswith(verdict)
+            assert (claim.verdict == verdict) == (values is not cases[1])
+
+
 def test_verdicts_follow_the_measurements(case):
     found = {claim.key: claim for claim in judge({CaseName('ur5', 'line'): case})}
     assert found['baseline'].verdict == 'holds'

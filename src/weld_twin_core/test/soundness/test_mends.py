@@ -58,6 +58,16 @@ def test_a_correction_that_was_written_down_does_the_same_again(kind, ur5, rng):
     assert (one.joints.qd is None) == (other.joints.qd is None)
 
 
+def test_the_map_of_a_models_readings_does_what_its_corrections_do_one_after_the_other(ur5, rng):
+    recording = recorded(ur5, moving(ur5, rng), rng)
+    again = {'matrix': np.diag([1.0, -1.0, 1.0, 1.0, 0.5, 1.0]), 'offset': np.full(6, 0.2)}
+    made = [*((kind, MADE[kind]) for kind in ('positions', 'joints', 'base')), ('joints', again)]
+    entries = tuple(as_entry(partial(mending.MENDS[kind], **how)) for kind, how in made)
+    matrix, offset = Model(ur5, (ur5.T_world_base,), mends=entries).reading_map()
+    wanted = replayed(entries, Given((recording,), ur5)).recordings[0].joints.q
+    np.testing.assert_allclose(recording.joints.q @ matrix.T + offset, wanted, atol=1e-12)
+
+
 def test_clocks_are_of_one_recording_alone(ur5, rng):
     given = Given((recorded(ur5, moving(ur5, rng), rng),), ur5)
     entry = as_entry(partial(mending.stamps_as, k=1, late=0.3, rate=0.0, middle=0.0))

@@ -18,7 +18,7 @@ from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _too_large_along
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, _borne
-from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, setup
+from weld_twin_core.diagnosis.soundness.set_up import _with_tools, _words, parted, setup
 from weld_twin_core.diagnosis.soundness.slips import (
     Slip,
     _of_strays,
@@ -176,7 +176,10 @@ def test_tools_of_recordings_are_found_each_by_itself_and_told_against_the_first
         tool[:3, 3] += step
         made = ur5.with_frames(tool=tool)
         runs.append(recorded(made, stations(ur5, rng, 20), rng, name=f'{k}'))
-    own = _with_tools(Snapshot(tuple(runs), asked(ur5, *runs)[1])).model
+    problem, model = asked(ur5, *runs)
+    for change, count in ((JointOffset('elbow_joint'), 1), (ToolPose(), 0)):  # that one is told
+        assert len(parted(Case(problem, replace(model, changes=(Change(1, change),))))) == count
+    own = _with_tools(Snapshot(tuple(runs), model)).model
     assert [change.recording for change in own.changes] == [1, 2]
     for change, step in zip(own.changes, steps[1:], strict=True):
         assert change.effect.fit.coordinates()[:3] == pytest.approx(step, abs=1e-4)
@@ -189,6 +192,8 @@ def test_what_can_be_undone_is_undone_only_where_that_is_asked_for(ur5, rng):
     (told,) = asked_for.unsound
     assert told.kind == 'zero_velocities' and told.applied and asked_for.posed is not None
     assert asked_for.given.recordings[0].joints.qd is None
+    assert asked_for.posed[1].mends == ({'do': 'velocities', 'k': 0},)
+    assert asked_for.posed[1].mended == (told.sentence,)
     assert len(asked_for.mistakes) == 1 and len(asked_for.checks) > 10
     left = examine(Given((bad,), ur5))
     assert left.posed is None and not left.unsound[0].applied and not left.mistakes

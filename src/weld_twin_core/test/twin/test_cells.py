@@ -38,8 +38,8 @@ workpiece:
   - {name: tilt, a: 0.1, d: 0.15, alpha: -1.5707963267948966, lower: -2.0, upper: 2.0}
   - {name: turn, d: 0.12, theta_offset: 0.4}
   links:
-  - {mass: 100.0, com: [0.0, 0.0, 0.0]}
-  - {mass: 40.0, com: [0.0, 0.0, 0.0]}
+  - {mass: 100.0, com: [0.02, 0.0, 0.01]}
+  - {mass: 40.0, com: [0.03, -0.02, 0.0]}
   payload: {mass: 20.0, com: [0.0, 0.0, 0.05]}
 """
 """Gravity is not told, so it pulls along -z of the base, which stands upright: along the track."""
@@ -119,21 +119,27 @@ def test_what_hangs_on_the_tool_loads_no_joint_of_the_positioner(cell):
     np.testing.assert_allclose(alone.position, both.position, atol=1e-15)
 
 
-def test_a_workpiece_on_its_side_loads_the_tilt_by_its_weight_and_lever(cell):
+@pytest.mark.parametrize('links', [True, False])
+def test_a_workpiece_on_its_side_loads_the_tilt_by_its_weight_and_lever(links):
     # At zero the tilt axis is level, along x of the world; weights stand off it along its row.
+    whole = yaml.safe_load(CELL)
+    data = whole['workpiece']
+    own = data['links'] if links else [{'mass': 0.0, 'com': [0.0, 0.0, 0.0]}] * 2
+    if not links:
+        del data['links'], whole['links']
+    cell = Robot.from_mapping(whole)
     q = np.zeros((1, cell.n))
     torque = gravity_torque(cell, q)[0, 1]
-    data = yaml.safe_load(CELL)['workpiece']
     work, lever = 0.0, 1e-6
     for sign in (1.0, -1.0):
-        pose, heights = stood(data['base']), []
+        pose, energy = stood(data['base']), 0.0
         for k, row in enumerate(data['joints']):
             angle = row.get('theta_offset', 0.0) + (sign * lever if k == 0 else 0.0)
             pose = pose @ step('z', angle) @ step('z', slide=row['d'])
             pose = pose @ step('x', slide=row.get('a', 0.0)) @ step('x', row.get('alpha', 0.0))
-            heights.append(pose[2, 3])
+            energy += G * own[k]['mass'] * (pose @ [*own[k]['com'], 1.0])[2]
         load = pose @ stood(data['tool']) @ step('z', slide=0.05)
-        energy = G * (100.0 * heights[0] + 40.0 * heights[1] + 20.0 * load[2, 3])
+        energy += G * 20.0 * load[2, 3]
         work -= sign * energy / (2.0 * lever)
     assert torque == pytest.approx(work, rel=1e-6)
     assert abs(torque) > 10.0

@@ -66,6 +66,16 @@ def sure(position=1e-5, low=-4.0, high=4.0):
     return Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
 
 
+def test_a_model_without_a_posterior_promises_nothing_and_finds_nothing_outside():
+    plain, motion = model(offset(5e-4)), JointMotion(np.arange(3.0), np.full((3, 6), 2.0))
+    assert plain.drawn(None, motion) is None
+    assert plain.outside(motion) == plain.postures_outside(motion.q) == []
+    assert plain.recorded(motion.q).tolist() == [True] * 3
+    learned = model(offset(5e-4), posterior=sure(high=1.4))
+    assert learned.outside(motion) and learned.postures_outside(motion.q)
+    assert not learned.recorded(motion.q).any()
+
+
 @settings(max_examples=6, deadline=None)
 @given(
     st.sampled_from(list(HOMES)),

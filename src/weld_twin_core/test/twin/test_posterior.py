@@ -373,3 +373,24 @@ def test_the_shrink_elsewhere_reaches_as_far_as_the_model_may_be_off_there():
     told = Shrink(1e-3, 3e-4, 0.3, (0.28, 0.32), 'stretches', elsewhere_ci95=(0.25, 0.35))
     assert elsewhere(told, known).elsewhere_ci95 == pytest.approx((0.25, 0.5))
     assert elsewhere(told, replace(known, anywhere_m=1e-5)).elsewhere_ci95 == (0.25, 0.35)
+
+
+def test_coordinates_are_named_alike_whatever_else_is_fitted():
+    offset, ripple = REGISTRY['joint_offset']('j2', 0.0), REGISTRY['transmission_ripple']('j2')
+    wave = ripple.search.with_orders(np.array([1.0, 2.5]))
+    coupled = REGISTRY['joint_coupling']('j3', 'j2', 0.0)
+    what = Directions(
+        ('base', 'tool'), 2, (offset, wave, coupled), (np.zeros(0), np.array([-0.5, 0.0, 0.5])), 2
+    )
+    axes = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
+    frames = [f'{frame}.{axis}' for frame in ('base 0', 'base 1', 'tool') for axis in axes]
+    assert what.names() == [
+        *frames,
+        'joint_offset j2 0',
+        *(f'transmission_ripple j2 {wave}' for wave in ('1 sin', '1 cos', '2.5 sin', '2.5 cos')),
+        'joint_coupling j3<j2 0',
+        'give of joint 1',
+        'give of joint 2',
+        *(f'curve of joint 2 at {place} by 0.5' for place in ('-0.500', '0.000', '0.500')),
+    ]
+    assert len(what.names()) == what.count

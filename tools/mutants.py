@@ -81,7 +81,7 @@ FOLDERS = {
     'arm': 'arm twin kernels',
     'assembly': 'messages_and_bags',
     'bags': 'messages_and_bags recording',
-    'cli': 'cli offline report',
+    'cli': 'cli offline programs report',
     'demo': 'cli',
     'effects': 'twin',
     'files': 'files cli',

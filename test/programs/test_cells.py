@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
+from weld_twin_msgs_py.programs.controllers import world_of
 
 QUARTER = 0.5 * np.pi
 RAIL = {'name': 'rail', 'type': 'prismatic', 'alpha': QUARTER, 'lower': -2.0, 'upper': 2.0}
@@ -354,3 +355,12 @@ def by_label(text, language):
         assert re.search(r'E1= *\S+ mm', first)
         out.append({name: float(value) for name, value in pairs})
     return out
+
+
+def test_the_world_of_a_controller_is_where_a_track_begins_or_that_of_the_arm(arm):
+    alone = wt.Robot.from_mapping(arm)
+    bare = {key: value for key, value in arm.items() if key not in ('links', 'controller')}
+    railed = wt.Robot.from_mapping({**bare, 'name': 'cell', 'joints': rows_of(arm)})
+    world, begins = world_of(railed, 'rapid')
+    assert begins == 'where the track begins' and np.array_equal(world, np.eye(4))
+    assert world_of(alone, 'rapid')[1] != begins

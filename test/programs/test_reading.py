@@ -855,12 +855,20 @@ def test_a_wait_is_of_its_own_routine_and_one_before_any_move_of_none():
     assert [step.where for step in steps] == [f'file0 line {k}' for k in (2, 6, 7)]
 
 
-def test_a_point_that_is_declared_twice_is_refused_with_its_line():
-    text = 'MODULE M\n' + 2 * (
-        'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'
-    )
+RAPID_POINT = 'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];'
+
+
+@pytest.mark.parametrize(
+    ('language', 'first', 'line'),
+    [
+        ('rapid', 'MODULE M', RAPID_POINT),
+        ('krl', 'DEFDAT A', 'DECL E6POS p1={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 2}'),
+        ('krl', 'DEFDAT A', 'DECL FDAT p1={TOOL_NO 2,BASE_NO 0,IPO_FRAME #BASE}'),
+    ],
+)
+def test_what_is_declared_twice_is_refused_with_its_line(language, first, line):
     with pytest.raises(TwinError, match='file0 line 3: p1 is declared twice'):
-        read('rapid', (text,))
+        read(language, (f'{first}\n{line}\n{line}\n',))
 
 
 def broken(text, draw):

@@ -202,6 +202,17 @@ def test_postures_measured_twice_as_finely_are_the_same_postures():
     )
     assert first.same_postures(finer) and finer.same_postures(first)
     assert not first.same_postures(weeks[-1])
+    unit = 10.0 ** np.linspace(-3.0, 3.0, first.value.size)  # whatever coordinates are counted in
+    one, other = (
+        replace(
+            each,
+            value=unit * each.value,
+            covariance=np.outer(unit, unit) * each.covariance,
+            prior_std=unit * each.prior_std,
+        )
+        for each in (first, finer)
+    )
+    assert one.same_postures(other)
 
 
 def framed(observations):

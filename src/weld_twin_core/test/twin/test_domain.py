@@ -86,6 +86,9 @@ def test_speed_load_and_temperature_beyond_are_told():
     assert domain.outside(known.joints.q, speed, wrench, np.full(400, 26.0)) == []
     (fast,) = domain.outside(known.joints.q, 3.0 * speed)[:1]
     assert 'rad/s' in fast.why and 'was recorded' in fast.why
+    # Slower than others ever were, and yet three times as fast as it was itself.
+    (slow,) = domain.outside(known.joints.q, speed * [1.0, 1.0, 1.0, 1.8, 1.0, 1.0])[:1]
+    assert slow.why.startswith('wrist_1_joint moves at up to 0.9 rad/s, at most 0.5')
     (heavy,) = domain.outside(known.joints.q, speed, 3.0 * wrench)
     assert heavy.why == 'the force on the tool is up to 60 N, at most 20 N was recorded'
     (warm,) = domain.outside(known.joints.q, speed, None, np.full(400, 31.0))

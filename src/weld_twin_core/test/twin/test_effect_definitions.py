@@ -623,6 +623,13 @@ def test_drives_that_all_trail_alike_look_like_a_late_clock_and_its_remedy_says_
     assert 'trail' not in effect('time_delay', delay=-0.015).remedy(ur5)
 
 
+@pytest.mark.parametrize('order', [3.0, [1.0, 4.0]])
+def test_sine_and_cosine_of_a_ripple_are_as_large_as_its_amplitude_usually_is(order):
+    ripple = effect('transmission_ripple', joint='j1', order=order)
+    usual = {p.name: p.typical for p in ripple.parameters}['amplitude']
+    assert ripple.fit.coordinate_scales().tolist() == [usual] * (2 * np.size(order))
+
+
 def test_an_effect_without_words_of_its_own_is_told_with_four_digits(ur5):
     told = effect('measurement_noise', sigma=0.00123456).remedy(ur5)
     assert 'sigma 0.001235 m' in told

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of trackers that publish transforms and of controllers that publish states of their own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -11,6 +13,7 @@ from weld_twin_core import DataError, ModelError, forward, load
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.cameras import Camera, Lens
 from weld_twin_msgs_py.bags import bag_info, read_recording
+from weld_twin_msgs_py.messages.image_points import corners
 from weld_twin_msgs_py.messages.topics import TopicNames
 from weld_twin_msgs_py.tables import read_target
 
@@ -291,6 +294,14 @@ def detection(cell, tag, middle, board):
     told |= {'decision_margin': 80.0, 'centre': cell.make(point, x=0.0, y=0.0)}
     told |= {'corners': [cell.make(point, x=x, y=y) for x, y in places], 'homography': np.zeros(9)}
     return cell.make('apriltag_msgs/msg/AprilTagDetection', **told)
+
+
+def test_a_tag_that_has_not_four_corners_that_are_somewhere_is_refused():
+    here, nowhere = SimpleNamespace(x=1.0, y=2.0), SimpleNamespace(x=np.nan, y=2.0)
+    for found, words in (([here] * 3, 'has 3 corners'), ([here] * 3 + [nowhere], 'no finite')):
+        message = SimpleNamespace(detections=[SimpleNamespace(id=7, corners=found)])
+        with pytest.raises(DataError, match=words):
+            corners(message)
 
 
 def test_tags_that_a_camera_found_tell_poses(tmp_path):

@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 
-from weld_twin_nodes.streams.supervision import Promise, Supervision
+from weld_twin_core.twin.goal_correction import Start
+from weld_twin_nodes.streams.supervision import ArmState, Moving, Promise, Supervision
 
 NOISE = 1e-4
 """Standard deviation of a measured coordinate [m]."""
@@ -110,3 +111,36 @@ def test_after_a_loss_the_model_is_used_once_twenty_measurements_bear_it_out():
             assert f'was lost: {k} of the 20' in watch.withdrawn(back)
             watch.take(white(rng, 1)[0] + np.array([change, 0.0, 0.0]), back + k / RATE)
         assert (not watch.withdrawn(back + 1.0)) is used
+
+
+def test_an_arm_tells_where_it_stands_and_from_which_side_each_joint_came():
+    arm = ArmState()
+    assert not arm.heard and arm.where(0.0, 1.0) is None and arm.start(0.0, 1.0) == Start()
+    way = np.linspace(0.0, 0.01, 51)
+    noise = 4e-5 * (-1.0) ** np.arange(51)
+    for k, q in enumerate(np.column_stack([way, -way, noise])):
+        arm.take(q, 0.01 * k)
+    start = arm.start(0.5, 1.0)
+    assert start.moving and start.came.tolist() == [1.0, -1.0, 0.0]
+    arm.take(np.array([0.01 - 6e-5, -0.01, 0.0]), 0.51)  # as little as that turns nothing
+    assert arm.start(0.51, 1.0).came.tolist() == [1.0, -1.0, 0.0]
+    for k in range(20):
+        arm.take(np.array([0.0098, -0.01, 0.0]), 0.52 + 0.01 * k)
+    start = arm.start(0.75, 1.0)
+    assert start.q.tolist() == [0.0098, -0.01, 0.0] and start.came.tolist() == [-1.0, -1.0, 0.0]
+    assert not start.moving
+    assert arm.where(1.7, 1.0) is not None and arm.where(1.8, 1.0) is None
+    arm.forget()
+    assert not arm.heard
+
+
+def test_whether_all_joints_of_a_model_moved_is_known_of_the_time_just_gone():
+    watch = Moving([0, 2])
+    assert watch.at(5)  # nothing is remembered
+    for k in range(1000):  # four seconds, in the last two of which joint 2 rests
+        t = 0.004 * k
+        watch.take(round(1e9 * t), np.array([0.1 * t, 0.0, 0.1 * min(t, 2.0)]))
+    assert watch.at(1_500_000_000) and not watch.at(2_500_000_000)
+    assert watch.at(1_000_000)  # as little as 20 ms tell no speed
+    watch.take(1_000_000_000, np.zeros(3))  # a clock that was set back
+    assert watch.at(1_000_000_000)

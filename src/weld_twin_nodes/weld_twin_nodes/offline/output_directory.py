@@ -221,13 +221,13 @@ def _foreign(folder: Path, name: str, *ours: str | None) -> str | None:
 
 
 def _blocking(folder: Path, name: str) -> str | None:
-    """Return what stands where a folder of ours, or a file, should be: a link, a file, a folder."""
+    """Return what stands where a folder of ours should be: a link or a file; None for nothing."""
     parts = Path(name).parts
     for k in range(1, len(parts)):
         above = folder / Path(*parts[:k])
         if above.is_symlink() or (_there(above) and not above.is_dir()):
             return above.relative_to(folder).as_posix()
-    return name if (folder / name).is_dir() else None
+    return None
 
 
 def _keep(folder: Path, name: str) -> None:

@@ -45,13 +45,14 @@ def test_jacobian_is_the_derivative_of_the_pose(robot):
         np.testing.assert_allclose(found[..., i], difference / (2 * step), atol=1e-8)
 
 
-@pytest.mark.parametrize('size', [0.0, 0.1])
-def test_every_geometric_channel_has_the_right_column_at_any_displacement(robot, size):
+@pytest.mark.parametrize(('size', 'draws'), [(0.0, ()), (0.1, ()), (0.1, (4, 1))])
+def test_every_geometric_channel_has_the_right_column_at_any_displacement(robot, size, draws):
     rng = np.random.default_rng(1)
     q, step = positions(robot), 1e-6
     channels = geometric_channels(robot)
     assert len(channels) == 12 + 5 * robot.n + (6 if robot.behind else 0)
     shift = {channel: np.asarray(size * rng.normal()) for channel in channels}
+    shift['theta', robot.n - 1] = size * rng.normal(size=draws)
     at = chain.frames(robot, q, shift)
     for channel in channels:
         after, before = (

@@ -338,16 +338,15 @@ def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) 
 def _root_column(robot: Robot, chain: Frames, i: int, shift: Shift) -> Array:
     """Return the column of a displacement of the positioner's foot: the robot goes the other way."""
     tip = components(chain.position)
-    axes = tip.ndim - 1
     if i < 3:
-        return -_slide_column(pad(components(chain.root_rotation[..., i]), axes), tip)
+        return -_slide_column(components(chain.root_rotation[..., i]), tip)
     error = _six(shift, 'root')
     axis = (np.eye(3) if error is None else left_jacobian(error[..., 3:]))[..., i - 3]
     rotation, origin = root_frame(robot, shift)
     to_foot = np.swapaxes(rotation, -1, -2) @ origin[..., None]
     foot = chain.root_point - (chain.root_rotation @ to_foot)[..., 0]
     turned = (chain.root_rotation @ axis[..., None])[..., 0]
-    return -_turn_column(pad(components(turned), axes), pad(components(foot), axes), tip)
+    return -_turn_column(components(turned), components(foot), tip)
 
 
 def jacobian(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:

@@ -5,6 +5,7 @@
 import re
 from dataclasses import replace
 from io import StringIO
+from types import SimpleNamespace
 
 import diagnoses
 import numpy as np
@@ -29,6 +30,7 @@ from weld_twin_nodes.wording.quantities import (
 from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_nodes.wording.words import cause, in_words, listed
 from weld_twin_report.report import print_summary
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.charts import furthest
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.diagnosis_page import _how_much
@@ -154,6 +156,27 @@ def test_what_remains_beside_a_name_is_not_told_as_above_the_noise_that_is_in_it
     told, _ = verdict(replace(case, status='unknown', gap=gap, unexplained=remains))
     words = '0.073 mm remains that no effect in the library explains; measuring noise alone is 0.041 mm'
     assert words in plain(told)
+
+
+@pytest.mark.parametrize(
+    ('more', 'words', 'wide'),
+    [
+        ({}, 'Elsewhere in its reach the corrected robot may still be off by 0.3 mm', False),
+        ({'recorded_m': 5e-5}, 'may still be off by 0.3 mm', True),
+        ({'left_open': ('base z', 'tool z')}, 'may still be off by 0.3 mm', True),
+        ({'anywhere_m': 1.0}, 'Of elsewhere in its reach these recordings tell nothing', True),
+        ({'region': ('seam 1', 2e-4)}, "In the region 'seam 1' the corrected robot may still be", False),
+    ],
+)  # fmt: skip
+def test_where_what_is_said_holds_is_told_with_how_wide_it_is_beyond(more, words, wide):
+    usual = {'region': None, 'anywhere_m': 3e-4, 'recorded_m': 2e-4, 'left_open': ()}
+    case, posterior = diagnoses.backlash(), SimpleNamespace(**{**usual, **more})
+    holds = Answer(replace(case, posterior=posterior)).holds
+    assert words in holds.elsewhere and holds.wide is wide and holds.file == ''
+    assert holds.open == [] or '2 directions of the frames are left open' in holds.open[0]
+    nothing = replace(diagnoses.nothing(), posterior=posterior)
+    assert 'says nothing of elsewhere' in Answer(nothing).holds.elsewhere
+    assert Answer(replace(case, posterior=None)).holds is None
 
 
 def test_what_is_left_beside_a_name_is_told_with_its_place():

@@ -58,7 +58,6 @@ def test_families_taken_out_only_stand_beside_and_are_said_to_be_absent():
 def test_what_the_data_cannot_show_is_absent_with_its_reason():
     found = library(*tiny())
     assert found.absent['servo_lag'] == 'static stations carry no velocity'
-    assert found.absent['thermal_growth'] == 'no temperature was recorded'
     assert found.absent['cartesian_compliance'] == 'no tool wrench was recorded'
 
 

@@ -97,10 +97,15 @@ def test_what_gives_across_an_axis_and_at_the_tool_is_no_error_of_other_joints(c
     assert all(one.probability > 0.9 for one in answer.causes if one.effect is not None)
 
 
-def test_growth_with_temperature_is_named_on_another_kind_of_arm():
-    answer = solved(flaw('thermal_growth', coefficient=5e-5), robot='kuka_kr6_r900', warm=True)
+@pytest.mark.parametrize('measured', [True, False])
+def test_growth_with_warmth_is_named_on_another_kind_of_arm(measured):
+    curve = {} if measured else {'rise': 10.0, 'time_constant': 3.0}
+    growth = flaw('thermal_growth', coefficient=5e-5, **curve)
+    answer = solved(growth, robot='kuka_kr6_r900', warm=measured)
     assert sites(answer) == [{('thermal_growth', None)}]
-    assert all(near(answer.effects[0], {'coefficient': 5e-5}).values())
+    assert answer.effects[0].effect.on == ('temperature' if measured else 'time')
+    sizes = {'coefficient': 5e-5} if measured else {'coefficient': 5e-5, 'warming_time': 3.0}
+    assert all(near(answer.effects[0], sizes).values())
 
 
 def test_without_a_flaw_nothing_is_named():

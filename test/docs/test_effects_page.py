@@ -29,8 +29,8 @@ BY_HAND = (
     '| all but `order`',
     '`friction` | joint | `windup` rad, `asymmetry` -, `travel` rad, `recovery` 1/s | `release` | time, '
     'velocity | yes | all',
-    '`thermal_growth` | links | `coefficient` 1/K | `reference`, `links`, `warmup` | temperature '
-    '| no | all',
+    '`thermal_growth` | links | `coefficient` 1/K, `warming_time` s | `reference`, `links`, `warmup` '
+    '| temperature | no | all',
     '`measurement_noise` | robot | `sigma` m |  |  | no | none',
 )
 

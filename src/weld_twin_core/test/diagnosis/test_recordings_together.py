@@ -103,8 +103,9 @@ def test_recordings_of_which_one_has_no_temperature_are_explained_without(turned
     given = (warm, bare)[::turned]
     kept = with_temperatures(given, ())
     problem, model = together(*kept)
-    absent = build(problem, model, problem.unit_scale()).absent
-    assert absent['thermal_growth'] == 'no temperature was recorded'
+    units = build(problem, model, problem.unit_scale()).units
+    (growth,) = [unit for unit in units if unit.site.effect == 'thermal_growth']
+    assert {seed.on for seed in growth.seeds} == {'time'}
     (note,) = kept[given.index(warm)].notes
     assert bare.name in note
     assert with_temperatures([warm], [bare])[0].temperature is None

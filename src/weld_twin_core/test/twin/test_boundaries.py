@@ -115,7 +115,8 @@ EFFECTS = yaml.safe_load("""
 - - {effect: thermal_growth, reference: warm}
   - "thermal_growth: reference must be a number, got 'warm'"
 - - {effect: thermal_growth, warmup: [10.0, 0.0]}
-  - "thermal_growth: warmup must be [rise in K, time constant in s above zero], got [10.0, 0.0]"
+  - "thermal_growth: warmup must be the rise in K, or [rise in K, time constant in s above zero], got
+    [10.0, 0.0]"
 - - {effect: transmission_ripple, joint: j0, amplitude: [1, 2], order: [1, 2, 3]}
   - "transmission_ripple: amplitude, order and phase must be numbers or lists of one length, got
     lengths [2, 3]"
@@ -186,7 +187,7 @@ def test_an_effect_survives_its_file(name, arm, positioner):
         'joint': 'j2' if of_cell else 'j1',
         'source': 'j2',
         'links': ['j0'],
-        'warmup': [1.0, 2.0],
+        'warmup': 1.0,
         'form': 'reversal',
     }
     kind = REGISTRY[name]

@@ -647,9 +647,12 @@ def test_stations_that_are_only_counted_show_no_warm_up(arm, make_recording):
         assert kind.applicable(view, 'j2') == reason
 
 
-def test_a_warm_up_curve_stands_in_for_a_temperature(arm, make_recording):
+@pytest.mark.parametrize('curve', [{'warmup': [10.0, 2.0]}, {'warmup': 10.0, 'warming_time': 2.0}])
+def test_a_warm_up_curve_stands_in_for_a_temperature(arm, make_recording, curve):
     recording = make_recording(arm)
-    warm = effect('thermal_growth', coefficient=1e-3, links=['j1'], warmup=[10.0, 2.0])
+    warm = effect('thermal_growth', coefficient=1e-3, links=['j1'], **curve)
+    assert warm.on == 'time' and warm.to_mapping().items() >= curve.items()
+    assert len(warm.fit.fitted()) == len(curve)  # a time constant that is given is kept
     elapsed = recording.joints.t - recording.joints.t[0]
     shift = warm.displace(Twin(arm).evaluate(recording).view)
     assert set(shift) == {('a', 1)}

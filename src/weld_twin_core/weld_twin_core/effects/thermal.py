@@ -3,10 +3,11 @@
 """
 What moves with heat: links that grow, all of them or one as it warms up, and a joint's zero.
 
-Thermal growth is a, d -> (1 + coefficient dT) a, d, with dT measured or a warm-up curve. A motor heats
-the link that it sits in, and its gear: with w = 1 - exp(-t / warming_time), from the recording's first
-stamp on, warm-up of one link is a, d -> (1 + strain w) a, d, of one joint theta -> theta + offset w.
-Where a temperature was recorded, w may follow it instead: (temperature - at) / rise.
+With w = 1 - exp(-t / warming_time), from the recording's first stamp on, thermal growth of all links is
+a, d -> (1 + coefficient dT) a, d, with dT measured, or a rise times w. A motor heats the link that it
+sits in, and its gear: warm-up of one link is a, d -> (1 + strain w) a, d, of one joint
+theta -> theta + offset w. Where a temperature was recorded, their w may follow it instead:
+(temperature - at) / rise.
 """
 
 from __future__ import annotations
@@ -15,100 +16,17 @@ from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import DataError, ModelError
-from .effect import Effect, FitHooks, Hooked, LinearEffect, Traits, register
+from .effect import Effect, FitHooks, Hooked, SearchHooks, Traits, register
 from .view import Array, Parameter, Robot, Shift, Stage, Value, View
 from .wording import number
 
 _REFERENCE = 20.0
 """Temperature [degC] at which the model holds unless something else is said, as lengths do (ISO 1)."""
-
-
-@register
-class ThermalGrowth(LinearEffect):
-    """
-    Links grow with temperature against ``reference`` [degC].
-
-    ``links`` names the joints whose rows grow (all when left out). Without a recorded
-    temperature, ``warmup: [rise, time_constant]`` [K, s] stands in for it.
-    """
-
-    coefficient: Value = 0.0
-    reference: float = _REFERENCE
-    links: Sequence[str] | None = None
-    warmup: Sequence[float] | None = None
-
-    traits = Traits(
-        title='thermal growth',
-        meaning='the links grow with temperature',
-        formula='a, d → (1 + coefficient ΔT) a, d; ΔT = temperature − reference (20 °C), or '
-        'rise (1 − exp(−t / time constant)) with `warmup: [rise, time constant]`',
-        entered='warming up, or of the temperature in the cell',
-        depends_on='temperature',
-        demand=1,
-    )
-    of = 'links'
-    stage = Stage.LINK
-    parameters = (
-        Parameter('coefficient', '1/K', typical=1.2e-5).plausible(
-            (2.4e-5, -2.4e-5, 7.2e-5),
-            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
-            'range derived: an arm may warm up three times as much as the place of the sensor',
-        ),
-    )
-    options = ('reference', 'links', 'warmup')
-    needs = frozenset({'temperature'})
-
-    def check(self, robot: Robot) -> None:
-        super().check(robot)
-        if isinstance(self.links, str):
-            raise ModelError(f'thermal_growth: links must be a list, got {self.links!r}')
-        for name in self.links or ():
-            robot.index(name)
-        if not isinstance(self.reference, Real):
-            raise ModelError(f'thermal_growth: reference must be a number, got {self.reference!r}')
-        if self.warmup is not None and not (_is_pair(self.warmup) and self.warmup[1] > 0.0):
-            raise ModelError(
-                'thermal_growth: warmup must be [rise in K, time constant in s above zero], '
-                f'got {self.warmup!r}'
-            )
-
-    @property
-    def at(self) -> str:
-        """Return the one link that grows, or the base where several do."""
-        return self.links[0] if self.links is not None and len(self.links) == 1 else 'base'
-
-    @property
-    def on(self) -> str:
-        return 'temperature' if self.warmup is None else 'time'
-
-    def rise(self, view: View) -> Array:
-        """Return the temperature above the reference, (N,) [K]; DataError where there is none."""
-        if self.warmup is not None:
-            return self.warmup[0] * -np.expm1(-view.elapsed / self.warmup[1])
-        if view.temperature is None:
-            raise DataError(
-                'thermal_growth needs a temperature: record /temperature, say it with '
-                '--temperature, or give the effect a warmup'
-            )
-        return view.temperature - self.reference
-
-    def per_unit(self, view: View) -> list[Shift]:
-        """Return length times temperature rise; travel of a joint that slides does not grow."""
-        robot = view.robot
-        rows = range(robot.n) if self.links is None else [robot.index(k) for k in self.links]
-        return [_grown(robot, rows, self.rise(view))]
-
-    def remedy(self, robot: Robot) -> str:
-        links = self.links or ('all links',)
-        return (
-            'Warm the arm up before welding, or compensate '
-            f'{number(self._plain("coefficient") * 1e3)} mm per m and K for {", ".join(links)}.'
-        )
 
 
 def _grown(robot: Robot, rows: Iterable[int], strain: Array) -> Shift:
@@ -125,15 +43,18 @@ _CONSTANTS = (0.15, 0.6, 2.5)
 """Time constants that a search starts from, in lengths of the recording: beyond, it is a ramp."""
 _WARMER = 1.0
 """Kelvin by which a temperature must vary to be followed: sensors wander by some tenths."""
+_RISE = 10.0
+"""Kelvin by which links are taken to warm up where none were recorded: with what metals grow by per
+kelvin, as much as one link grows beside its motor."""
 _NUMBERED = 1e-6
 """By how much [s] stamps of stations are further apart than one where they are row numbers."""
 
 
 class _Fit(FitHooks):
-    effect: _WarmUp
+    effect: _Warming
 
     def fitted(self) -> list[int]:
-        return [0, 1] if self.effect.follows is None else [0]
+        return [0, 1] if self.effect._timed else [0]
 
 
 _WARMING_TIME = Parameter(
@@ -144,7 +65,189 @@ _WARMING_TIME = Parameter(
 )
 
 
-class _WarmUp(Effect):
+class _Warming(Effect):
+    """Something moves by its first parameter times how warm it is, by a temperature or a curve."""
+
+    warming_time: Value
+
+    options: ClassVar[tuple[str, ...]]
+    fit = Hooked(_Fit)
+
+    @property
+    @abstractmethod
+    def _curve(self) -> tuple[float, Array | float] | None:
+        """Return how warm it gets, and in what time [s]; None where a temperature says it."""
+
+    @property
+    @abstractmethod
+    def _measured(self) -> tuple[float, float]:
+        """Return the temperature at which nothing has moved, and by how much more it is warm [K]."""
+
+    @property
+    def _timed(self) -> bool:
+        """Return whether the time constant of the curve is a parameter."""
+        return self._curve is not None
+
+    @abstractmethod
+    def _moved(self, view: View, size: Array) -> Shift:
+        """Return what a size of the first parameter moves, shape (N,)."""
+
+    @property
+    def on(self) -> str:
+        return 'temperature' if self._curve is None else 'time'
+
+    def _warmth(self, view: View) -> Array:
+        """Return how warm it is, shape (N,)."""
+        if self._curve is not None:
+            warm, constant = self._curve
+            return warm * -np.expm1(-view.elapsed / constant)
+        if view.temperature is None:
+            raise DataError(
+                f'{self.name} needs a temperature: record /temperature, say it with '
+                '--temperature, or give the effect a curve in time'
+            )
+        at, rise = self._measured
+        return np.asarray((view.temperature - at) / rise)
+
+    def displace(self, view: View) -> Shift:
+        size = self.number(self.parameters[0].name)
+        return self._moved(view, size * self._warmth(view))
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        slow = np.zeros_like(view.elapsed)
+        if self._curve is not None and self._timed:
+            warm, constant = self._curve
+            slow = -warm * view.elapsed / constant**2 * np.exp(-view.elapsed / constant)
+        size = self.number(self.parameters[0].name)
+        return [self._moved(view, self._warmth(view)), self._moved(view, size * slow)]
+
+    def atoms(self, view: View) -> list[Shift]:
+        return [self._moved(view, self._warmth(view))]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry of a file, without the time constant of a curve that it does not follow."""
+        entry = super().to_mapping()
+        return entry if self._timed else {k: v for k, v in entry.items() if k != 'warming_time'}
+
+
+def _lengths_of_recording(view: View) -> list[float]:
+    """Return the time constants [s] that a search starts from: fast, usual and slow."""
+    span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
+    return [share * span for share in _CONSTANTS]
+
+
+class _Search(SearchHooks):
+    def small(self, view: View, joint: str | None, most: int) -> list[Any]:
+        """Return growth with a temperature alone: what goes with time is no small error."""
+        return [] if view.temperature is None else [self.kind()]
+
+
+@register
+class ThermalGrowth(_Warming):
+    """
+    Links grow with temperature against ``reference`` [degC].
+
+    ``links`` names the joints whose rows grow (all when left out). Without a recorded temperature,
+    ``warmup: rise`` [K] is how much warmer they get, with ``warming_time``; of
+    ``warmup: [rise, time_constant]`` [K, s] the time is known, and not fitted.
+    """
+
+    coefficient: Value = 0.0
+    reference: float = _REFERENCE
+    links: Sequence[str] | None = None
+    warmup: float | Sequence[float] | None = None
+    warming_time: Value = 60.0
+
+    traits = Traits(
+        title='thermal growth',
+        meaning='the links grow with temperature',
+        formula='a, d → (1 + coefficient ΔT) a, d; ΔT = temperature − reference (20 °C), or '
+        'rise (1 − exp(−t / warming_time)) with `warmup: rise`',
+        entered='warming up, or of the temperature in the cell',
+        depends_on='temperature',
+        demand=1,
+    )
+    of = 'links'
+    stage = Stage.LINK
+    parameters = (
+        Parameter('coefficient', '1/K', typical=1.2e-5).plausible(
+            (2.4e-5, -2.4e-5, 7.2e-5),
+            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
+            'range derived: an arm may warm up three times as much as the place of the sensor',
+        ),
+        _WARMING_TIME,
+    )
+    options = ('reference', 'links', 'warmup')
+    needs = frozenset({'temperature'})
+    search = Hooked(_Search)
+
+    def check(self, robot: Robot) -> None:
+        super().check(robot)
+        if isinstance(self.links, str):
+            raise ModelError(f'thermal_growth: links must be a list, got {self.links!r}')
+        for name in self.links or ():
+            robot.index(name)
+        if not isinstance(self.reference, Real):
+            raise ModelError(f'thermal_growth: reference must be a number, got {self.reference!r}')
+        known = isinstance(self.warmup, Sequence) and _is_pair(self.warmup) and self.warmup[1] > 0.0
+        if not (self.warmup is None or isinstance(self.warmup, Real) or known):
+            raise ModelError(
+                'thermal_growth: warmup must be the rise in K, or [rise in K, time constant in s '
+                f'above zero], got {self.warmup!r}'
+            )
+
+    @property
+    def at(self) -> str:
+        """Return the one link that grows, or the base where several do."""
+        return self.links[0] if self.links is not None and len(self.links) == 1 else 'base'
+
+    @property
+    def _curve(self) -> tuple[float, Array | float] | None:
+        if self.warmup is None:
+            return None
+        if isinstance(self.warmup, Sequence):
+            return self.warmup[0], self.warmup[1]
+        return self.warmup, self.number('warming_time')
+
+    @property
+    def _timed(self) -> bool:
+        return isinstance(self.warmup, Real)
+
+    @property
+    def _measured(self) -> tuple[float, float]:
+        return self.reference, 1.0
+
+    def _moved(self, view: View, size: Array) -> Shift:
+        """Return length times growth; travel of a joint that slides does not grow."""
+        robot = view.robot
+        rows = range(robot.n) if self.links is None else [robot.index(k) for k in self.links]
+        return _grown(robot, rows, size)
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """Return why the data cannot show it: neither a temperature nor times were recorded."""
+        timed = view.temperature is None and not _untimed(view)
+        return None if timed else super().applicable(view, joint)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield growth with the temperature; where none was recorded, curves of warming up."""
+        if view.temperature is not None:
+            yield cls()
+        else:
+            for constant in _lengths_of_recording(view):
+                yield cls(warmup=_RISE, warming_time=constant)
+
+    def remedy(self, robot: Robot) -> str:
+        links = self.links or ('all links',)
+        grown = self._plain('coefficient') * 1e3
+        return (
+            f'Warm the arm up before welding, or compensate {number(grown)} mm per m and K for '
+            f'{", ".join(links)}.'
+        )
+
+
+class _WarmUp(_Warming):
     """
     One joint or link moves by its first parameter as it warms up; see the head of this file.
 
@@ -152,17 +255,11 @@ class _WarmUp(Effect):
     """
 
     joint: str
-    warming_time: Value
     follows: Sequence[float] | None
 
     traits = Traits(entered='warming up', depends_on='time', common=False)
     options = ('follows',)
     needs = frozenset({'time'})
-    fit = Hooked(_Fit)
-
-    @abstractmethod
-    def _moved(self, view: View, size: Array) -> Shift:
-        """Return what a size of the first parameter moves, shape (N,)."""
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
@@ -173,48 +270,27 @@ class _WarmUp(Effect):
             )
 
     @property
-    def on(self) -> str:
-        return 'time' if self.follows is None else 'temperature'
+    def _curve(self) -> tuple[float, Array | float] | None:
+        return (1.0, self.number('warming_time')) if self.follows is None else None
 
-    def _warmth(self, view: View) -> Array:
-        """Return how warm it is, 1 at the end, shape (N,)."""
-        if self.follows is None:
-            return -np.expm1(-view.elapsed / self.number('warming_time'))
-        if view.temperature is None:
-            raise DataError(f'{self.name} follows a temperature: record /temperature')
-        return np.asarray((view.temperature - self.follows[0]) / self.follows[1])
-
-    def displace(self, view: View) -> Shift:
-        size = self.number(self.parameters[0].name)
-        return self._moved(view, size * self._warmth(view))
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        slow = np.zeros_like(view.elapsed)
-        if self.follows is None:
-            constant = self.number('warming_time')
-            slow = -view.elapsed / constant**2 * np.exp(-view.elapsed / constant)
-        size = self.number(self.parameters[0].name)
-        return [self._moved(view, self._warmth(view)), self._moved(view, size * slow)]
-
-    def atoms(self, view: View) -> list[Shift]:
-        return [self._moved(view, self._warmth(view))]
+    @property
+    def _measured(self) -> tuple[float, float]:
+        assert self.follows is not None
+        return self.follows[0], self.follows[1]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """Return why the data cannot show it: stations that are only counted tell no time."""
-        if view.static and _counted(view.t):
-            return 'the stations carry no times'
-        return super().applicable(view, joint)
+        return _untimed(view) or super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
-        span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
         kind: Any = cls  # whose first fields are joint, size and time constant
-        for share in _CONSTANTS:
-            yield kind(str(joint), 0.0, share * span)
+        for constant in _lengths_of_recording(view):
+            yield kind(str(joint), 0.0, constant)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
-            yield kind(str(joint), 0.0, span, (_REFERENCE, rise))
+            yield kind(str(joint), follows=(_REFERENCE, rise))
 
 
 @register
@@ -304,6 +380,8 @@ class JointWarmUp(_WarmUp):
         )
 
 
-def _counted(t: Array) -> bool:
-    """Tell whether stamps of stations, shape (M,), are row numbers, as tables without times have."""
-    return t.size < 3 or bool(np.abs(np.diff(t) - 1.0).max() <= _NUMBERED)
+def _untimed(view: View) -> str | None:
+    """Return what to say of stations whose stamps are row numbers, as tables without times have."""
+    t = view.t
+    counted = t.size < 3 or bool(np.abs(np.diff(t) - 1.0).max() <= _NUMBERED)
+    return 'the stations carry no times' if view.static and counted else None

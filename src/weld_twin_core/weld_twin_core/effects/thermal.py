@@ -189,7 +189,9 @@ class ThermalGrowth(_Warming):
             robot.index(name)
         if not isinstance(self.reference, Real):
             raise ModelError(f'thermal_growth: reference must be a number, got {self.reference!r}')
-        known = isinstance(self.warmup, Sequence) and _is_pair(self.warmup) and self.warmup[1] > 0.0
+        known = (
+            isinstance(self.warmup, Sequence) and _is_pair(self.warmup) and self.warmup[1] > 0.0
+        )
         if not (self.warmup is None or isinstance(self.warmup, Real) or known):
             raise ModelError(
                 'thermal_growth: warmup must be the rise in K, or [rise in K, time constant in s '

@@ -319,6 +319,7 @@ def test_two_tools_that_the_program_only_names_are_not_both_that_of_the_robot_fi
         (text, (), 'the tool of the robot file was taken'),
         (other, (), 'numbers of tools 1, 2 are not in the program'),
         (other, ('--tool', '2=0,0,90,0,0,0'), 'the tool of the robot file was taken'),
+        (other, ('--tool', '1=0,0,250,0,0,0'), 'the tool of the robot file is tool 1'),
     ):
         (tmp_path / 'p.ls').write_text(each)
         asked = words(tmp_path / 'p.ls', robot, tmp_path / 'out', tmp_path / 'off.yaml')

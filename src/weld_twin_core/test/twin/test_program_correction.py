@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Points of a program are moved by what the real tool misses there, seams whole or not at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
 from weld_twin_core.twin.posterior import Drawn
-from weld_twin_core.twin.program_correction import Caps, accuracy, correct_program
+from weld_twin_core.twin.program_correction import Caps, accuracy, along_seams, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
 
 START = np.array([0.3, -1.4, 1.7, -1.9, -1.5, 0.2])
@@ -188,3 +190,16 @@ def test_what_is_expected_of_a_seam_does_not_hang_on_how_many_moves_it_has(ur5):
         off = np.linalg.norm(np.concatenate(found.before)[:, :3], axis=1)
         told.append((off.max(), np.sqrt(np.average(off**2, weights=np.concatenate(found.ways)))))
     np.testing.assert_allclose(told[0], told[1], rtol=0.01)
+
+
+def test_a_program_that_begins_where_the_arm_stands_is_promised_no_less(ur5):
+    off = wt.effects.JointOffset('elbow_joint', offset=-1e-3)
+    there = seam(ur5, *(Move('linear', use(k), EYE, speed=0.01) for k in (1, 2)))
+    first, *others = there.pieces[0]
+    there = replace(there, pieces=((first._replace(stop=False), *others),))
+    told = []
+    for start in (START, START + 0.1):
+        found = correct_program(ProgramModel(ur5, (off,)), there, start=start)
+        before, after = along_seams(found)
+        told.append(after.worst / before.worst)  # bends between points
+    assert max(told) < 0.02

@@ -313,7 +313,7 @@ class _Work(NamedTuple):
         looks = tuple(refined(piece, parts) for piece in self.travel.pieces)
         for piece, look in zip(self.travel.pieces, looks, strict=True):
             aim = self.model.wanted(look)
-            motion = finer(repeated(self.model.robot, moved, piece), parts)
+            motion = _looked_at(piece, repeated(self.model.robot, moved, piece), look, parts)
             before.append(missing(aim, self.model.real(look, look.motion, whole=True)))
             after.append(missing(aim, self.model.real(look, motion, whole=True)))
             steps = np.diff(aim[:, :3, 3], axis=0, prepend=aim[:1, :3, 3])
@@ -355,6 +355,18 @@ class _Work(NamedTuple):
             by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
             out.append(_MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
         return tuple(out)
+
+
+def _looked_at(piece: Piece, motion: JointMotion, look: Piece, parts: int) -> JointMotion:
+    """
+    Return a corrected motion at looks.
+
+    What it differs by is made finer by itself: how fast a joint goes between two samples hangs on
+    the samples beside them, and a move that a correction alone gives a length would shift all of
+    the way to the next sample.
+    """
+    apart = finer(JointMotion(motion.t, motion.q - piece.motion.q), parts)
+    return JointMotion(look.motion.t, look.motion.q + apart.q)
 
 
 def _too_hard(robot: Robot, piece: Piece, motion: JointMotion) -> dict[int, str]:

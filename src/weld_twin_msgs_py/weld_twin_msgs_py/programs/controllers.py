@@ -121,9 +121,13 @@ class Cell(NamedTuple):
     """Names of bases that go along with a positioner, in lower case; None where it was not
     told."""
     world: Array | None = None
-    """Where the robot's rows begin in the world of the controller, shape (4, 4) [m]."""
+    """Where the link that the track stands in is in the world of the controller, shape (4, 4) [m]; of
+    a robot file that tells of none, where its rows begin."""
 
 
+_SAME_TOOL = 1e-4
+"""Difference [m, and of axes] up to which numbers are those of one tool: pendants show hundredths of a
+millimetre and of a degree."""
 _PLAIN = re.compile(r'[A-Za-z_$]\w*|\d+')
 """A name or number of a tool, such as the controller has numbers for."""
 
@@ -165,6 +169,8 @@ class Controller:
     positioner: bool = False  # some of the external axes move the workpiece
     bare: set[str] = field(default_factory=set)
     """Names of the tools of a program that nobody gives numbers for."""
+    own_names: set[str] = field(default_factory=set)
+    """Names of those whose numbers are those of the robot file's tool."""
 
     def tool(self, frame: Frame) -> Array:
         """Return ``T_flange_tool`` on the model."""
@@ -186,6 +192,11 @@ class Controller:
                 f'the numbers of tool {frame.name} are not in the program, and the robot file has '
                 'no tool' + _ask(frame, '--tool')
             )
+        if self.own_names:
+            raise DataError(
+                f'the numbers of tool {frame.name} are not in the program, and the tool of the robot '
+                f'file is tool {min(self.own_names)}' + _ask(frame, '--tool')
+            )
         if len(self.bare) > 1:
             listed = ', '.join(sorted(self.bare))
             raise DataError(
@@ -200,9 +211,16 @@ class Controller:
 
     def name_tools(self, frames: Iterable[Frame]) -> None:
         """Take in all tools of a program: the robot file has the numbers of one."""
-        open_ = (frame for frame in frames if frame.name and frame.value is None and not frame.why)
         self.bare.clear()
-        self.bare.update(f.name for f in open_ if f.name.lower() not in self.tools)
+        self.own_names.clear()
+        for frame in frames:
+            value = self.tools.get(frame.name.lower(), frame.value)
+            if not frame.name or (value is None and frame.why):
+                continue
+            if value is None:
+                self.bare.add(frame.name)
+            elif np.abs(self.flange @ value - self.own_tool).max() < _SAME_TOOL:
+                self.own_names.add(frame.name)
 
     def goes_along(self, frame: Frame) -> bool:
         """Tell whether a base goes along with a positioner."""
@@ -268,7 +286,8 @@ def controller_of(
     frames = robot.controller or controller_frames(arm)
     origin, notes = np.array(frames.base), _linked(frames)
     if given.world is not None:
-        origin = np.array(np.linalg.inv(given.world))
+        origin = robot.T_base_foot @ np.linalg.inv(given.world)
+        notes.append(_track_begins(robot))
     mix = _counting(arm, robot, language, origin, notes)
     if axes and language in LABELS:
         mix = shown_order(robot, axes) @ mix
@@ -288,6 +307,15 @@ def controller_of(
     )
 
 
+def _track_begins(robot: Robot) -> str:
+    where = 'the first link of the chain'
+    if robot.controller is None:
+        where = 'the frame of the first row of the robot file, its z along the first axis,'
+    elif not robot.controller.base_link:
+        where = "the 'foot' of the robot file"
+    return f'--world was taken to be where {where} stands'
+
+
 def world_of(robot: Robot, language: str) -> tuple[Array, str]:
     """
     Return the world of a controller as delivered, in the frame where the robot's own rows begin.
@@ -296,7 +324,7 @@ def world_of(robot: Robot, language: str) -> tuple[Array, str]:
     """
     count = carrying(robot)
     if count > robot.behind:
-        return np.eye(4), 'where the track begins'
+        return robot.T_base_foot, 'where the track begins'
     arm = CarriedArm(robot, count).arm
     frames = robot.controller or controller_frames(arm)
     origin, notes = np.array(frames.base), list[str]()

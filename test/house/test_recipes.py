@@ -83,7 +83,7 @@ DIAGNOSED = """
     from weld_twin_core.diagnosis.result import NAMING
     from weld_twin_core.effects.registry import way
     from weld_twin_lab.blind.cause_sizes import FAMILIES
-    from weld_twin_report.history.words import likely
+    from weld_twin_report.history.words import beforehand
     from weld_twin_report.report.diagnosis_page import report_page
 
     truth = [{'effect': 'torch_sag', 'droop': 6e-4}]
@@ -99,8 +99,8 @@ DIAGNOSED = """
     assert 'sagging torch' in page and 'bends under its own weight' in page
     assert wt.effects.TorchSag is type(one.effect)
     assert 'torch_sag' in FAMILIES
-    past = [SimpleNamespace(names=('torch_sag droop', 'drift xyz_rate'))]
-    assert likely(past) == {'torch_sag droop'}
+    past = [SimpleNamespace(names=('torch_sag droop', 'drift xyz_rate'), effects=())]
+    assert beforehand(past)['likely'] == {'torch_sag droop'}
     assert way(['cartesian_compliance', 'torch_sag']) == 'hang a weight on the torch'
     assert '`torch_sag`' in [row[0] for row in effect_rows()]
     assert 'sagging torch' in [title for title, _ in cause_rows()]

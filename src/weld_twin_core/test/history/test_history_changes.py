@@ -132,6 +132,22 @@ def test_what_recordings_cannot_tell_apart_comes_as_a_set():
     assert changes(months, named={NAMES[1]})[0].name == NAMES[1]
 
 
+@pytest.mark.parametrize('slow', [0, 1])
+def test_what_warmth_alone_changes_steps_no_sooner_than_what_is_knocked(slow):
+    months = year(9, only(0, 1.5, 12), weeks=24, same=[(1, 0)])
+    found = changes(months, likely=NAMES, slow={NAMES[slow]})
+    assert (found[0].kind, found[0].name) == ('step', NAMES[1 - slow])
+
+
+@pytest.mark.parametrize('slow', [0, 1])
+def test_what_warmth_alone_changes_is_as_likely_in_a_season_as_before(slow):
+    swing = year(
+        9, lambda w: 1.5 * np.sin(2.0 * np.pi * w / 52.0) * only(0, 1.0, 0)(w), same=[(1, 0)]
+    )
+    told = [changes(swing, likely=NAMES, slow=each) for each in ((), {NAMES[slow]})]
+    assert told[0] == told[1] and told[0][0].kind == 'season'
+
+
 def test_the_prior_is_taken_out_of_what_the_data_say():
     rng = np.random.default_rng(5)
     rows, width = rng.normal(size=(9, 4)), np.array([0.1, 1.0, 3.0, 0.5])

@@ -116,6 +116,7 @@ class LinkLength(_LinkError):
         meaning='a length in the model of the robot is wrong',
         formula='a → a + da',
         changes_in_use=True,
+        changes_slowly=True,
     )
     channel = 'a'
     parameters = (

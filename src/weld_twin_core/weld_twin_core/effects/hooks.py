@@ -64,6 +64,8 @@ class Traits:
     """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
     changes_in_use: bool = False
     """Whether use changes it: belts are taken off, tools are knocked, gears wear, loads are swapped."""
+    changes_slowly: bool = False
+    """Whether warmth alone changes it in use, which takes no step."""
     set_at_controller: bool = False
     """Whether a person can set it first: named before others that are the same on any motion."""
     fitted_with: str | None = None

@@ -106,6 +106,7 @@ def changes(
     *,
     named: Collection[str] = (),
     likely: Collection[str] = (),
+    slow: Collection[str] = (),
     alarms: float = _ALARMS,
 ) -> tuple[Change, ...]:
     """
@@ -115,20 +116,14 @@ def changes(
 
     named: coordinates that a diagnosis has named as causes: of those that explain a change equally
     well, they come first. likely: those that knocks, wear, service or warmth can change, before
-    others.
+    others. slow: those of them that do not change at once.
     """
     series = series_of(observations)
     if series.days.size < 2:
         return ()
     shapes = series.shapes
     tests = max(len(shapes), _TRIED) * len(series.things)
-    sooner = np.array(
-        [
-            _NAMED * any(series.names[k] in named for k in places)
-            + _LIKELY * any(series.names[k] in likely for k in places)
-            for places in series.things
-        ]
-    )
+    sooner = np.array([_sooner(series, shape.kind, named, likely, slow) for shape in shapes])
     # The last few diagnoses hardly tell a step from a trend; a step is the simpler.
     simple = np.array(
         [
@@ -150,6 +145,19 @@ def changes(
     return _on_top([change for _, change in look.settled(taken)])
 
 
+def _sooner(
+    series: Series,
+    kind: str,
+    named: Collection[str],
+    likely: Collection[str],
+    slow: Collection[str],
+) -> list[float]:
+    """Return the log prior odds of every thing before others that explain as much."""
+    able = set(likely) - set(slow) if kind == 'step' else set(likely)
+    names = [{series.names[k] for k in places} for places in series.things]
+    return [_NAMED * bool(of & set(named)) + _LIKELY * bool(of & able) for of in names]
+
+
 def _on_top(result: Sequence[Change]) -> tuple[Change, ...]:
     """Return changes with each trend known for what it is beside an earlier one of its coordinate."""
     begun = [(each.name, each.day) for each in result if each.kind == 'trend']
@@ -166,7 +174,7 @@ class _Look(NamedTuple):
     bar: Array
     """Shape (shapes, things)."""
     sooner: Array
-    """Log prior odds of a thing before others that explain as much, shape (things,)."""
+    """Log prior odds of a thing before others that explain as much, shape (shapes, things)."""
 
     def next(self, result: Sequence[_Term]) -> tuple[_Term, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""
@@ -192,7 +200,7 @@ class _Look(NamedTuple):
         most = gain[same].max(axis=0)
         alike = np.flatnonzero(most > top - _ALIKE)
         at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
-        odds = {j: system.odds(k, j, scatter) + float(self.sooner[j]) for j, k in at.items()}
+        odds = {j: system.odds(k, j, scatter) + float(self.sooner[k, j]) for j, k in at.items()}
         thing = max(odds, key=lambda j: odds[j])
         shape = shapes[at[thing]]
         near = [shapes[k].begin for k in same if gain[k, thing] > most[thing] - _DATED]

@@ -12,7 +12,7 @@ the years that are diagnosed in full, whose every check is simulated and diagnos
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from typing import Any
@@ -24,7 +24,7 @@ from weld_twin_core.history import Change, Observation, changes, outlook, reache
 from weld_twin_msgs_py.files import markdown
 from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_report.history import Entry, observations
-from weld_twin_report.history.words import likely, named
+from weld_twin_report.history.words import Beforehand, beforehand
 
 from ..blind.scoring import NORMAL_90
 from ..study import Study, require_simulator
@@ -52,15 +52,13 @@ LAST = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parall
 def score(
     observations: Sequence[Observation],
     year: Year,
-    named: Collection[str],
-    likely: Collection[str],
+    believed: Beforehand,
     joints: Sequence[str],
     truth: Mapping[str, float],
 ) -> dict[str, Any]:
     """
     Return what a year of weekly looks came to: its events, and the alarms for nothing.
 
-    named, likely: coordinates that a diagnosis has named as causes, and that use can change.
     truth: values before anything happened.
     """
     weeks = np.array(year.weeks, float)
@@ -70,7 +68,7 @@ def score(
     before: set[tuple[str, str]] = set()
     reported: tuple[Change, ...] = ()
     for k in range(FEWEST, len(observations) + 1):
-        reported = changes(observations[:k], named=named, likely=likely)
+        reported = changes(observations[:k], **believed)
         wrong = set()
         for change in reported:
             hits = [i for i, event in enumerate(year.events) if _same(event, change, joints)]
@@ -441,9 +439,7 @@ def scored(
         for each in yearly.as_built
     }
     joints = yearly.cell.robot.joint_names
-    scores = score(
-        seen, lived(seed, number, first), named(entries), likely(entries), joints, truth
-    )
+    scores = score(seen, lived(seed, number, first), beforehand(entries), joints, truth)
     status = dict(Counter(each.status for each in entries))
     return {**scores, 'status': status, 'weeks': len(entries), 'unit': WEEK}
 
@@ -458,7 +454,7 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
     truth = dict(zip(checks[0].names, map(float, arm), strict=True))
     seen = drawn(checks, lived, truth, rng)
     joints = [name.split(' ')[1] for name in truth if name.startswith('joint_offset ')]
-    return score(seen, lived, named(checks), likely(checks), joints, truth)
+    return score(seen, lived, beforehand(checks), joints, truth)
 
 
 def _common(entries: Sequence[Entry]) -> list[Entry]:

@@ -5,7 +5,7 @@
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -46,21 +46,33 @@ def _steady(name: str) -> bool:
     return made or name.startswith((CURVE, GIVE))
 
 
-def named(entries: Sequence[Entry]) -> set[str]:
+class Beforehand(TypedDict):
+    """What is believed of coordinates before a change is looked for, as `changes` takes it."""
+
+    named: set[str]
+    likely: set[str]
+    slow: set[str]
+
+
+def beforehand(entries: Sequence[Entry]) -> Beforehand:
     result = ((each['effect'], each.get('joint')) for entry in entries for each in entry.effects)
-    return {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in result}
+    effects = REGISTRY.values()
+    return {
+        'named': {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in result},
+        'likely': _of(entries, {'tool', *(e.name for e in effects if e.traits.changes_in_use)}),
+        'slow': _of(entries, {e.name for e in effects if e.traits.changes_slowly}),
+    }
 
 
-def likely(entries: Sequence[Entry]) -> set[str]:
-    """Return the coordinates that use can change; those of the tool by axis."""
-    in_use = {'tool', *(name for name, effect in REGISTRY.items() if effect.traits.changes_in_use)}
+def _of(entries: Sequence[Entry], effects: set[str]) -> set[str]:
+    """Return the coordinates of effects; those of the tool stand by axis."""
     names = {name for entry in entries for name in entry.names}
-    return {name for name in names if name.replace('.', ' ').split(' ')[0] in in_use}
+    return {name for name in names if name.replace('.', ' ').split(' ')[0] in effects}
 
 
 def changed(entries: Sequence[Entry], seen: Sequence[Observation]) -> tuple[Change, ...]:
     """Return what changed on a cell, the surest first."""
-    return changes(seen, named=named(entries), likely=likely(entries))
+    return changes(seen, **beforehand(entries))
 
 
 def _moved(entry: Entry, first: Array) -> Array:

@@ -6,7 +6,6 @@ Break the code on purpose, one place at a time, and count how often the tests no
 
     tools/in_env python tools/mutants.py                     200 drawn from the whole diagnosis
     tools/in_env python tools/mutants.py --room weld_twin_core.twin --draw 60
-    tools/in_env python tools/mutants.py --room all --draw 60  from each room of all packages in turn
     tools/in_env python tools/mutants.py --room product --draw 60  by lines, from all that users have
 
 A mutant is a comparison turned round or moved to its boundary, a number 25 % up or down, a sign, a
@@ -94,16 +93,15 @@ FOLDERS = {
     'tables': 'tables messages_and_bags',
     'wording': 'report',
 }
-EVERY = 'all'
-"""What stands for the rooms of all packages."""
 PRODUCT, PROOFS = 'product', 'weld_twin_lab'
 """What stands for all packages but that of the proofs."""
 QUICK = 'not slow and not cells'
 CHEAP, SLOW, SPENT = 0.2, 12.0, 24.0
 """Seconds, with all calls noted, that a test takes which is asked at once, that one may take, and all of
 them together."""
-SURVIVES, UNDECIDED = 0, 2
-"""What a process ends with whose mutant no test noticed: of all that reach it, or in the time."""
+ENDS = {0: 'survives', 2: 'undecided', 3: 'no test runs'}
+"""What a process ends with whose mutant no test noticed: of all that reach it, in the time, or as none
+does, for it is made when modules are imported or runs in other processes."""
 FIRST = 'test_kept_answers'
 """What sees most is asked first of the others."""
 LONGEST = 60
@@ -401,7 +399,7 @@ class Asked:
         self.of_room = of_room
         self.drawn, self.files, self.trees, self.jobs = list(drawn), files, trees, jobs
         self.told: list[tuple[Place, str, bool]] = []
-        self.spent, self.undecided = 0.0, 0
+        self.spent, self.ends = 0.0, Counter[str]()
 
     def pytest_runtestloop(self, session: Any) -> bool:
         """Run everything in the place of the usual loop."""
@@ -420,11 +418,10 @@ class Asked:
             child, status = os.wait()
             place, words = running.pop(child)
             code = os.waitstatus_to_exitcode(status)
-            self.told.append((place, words, code not in (SURVIVES, UNDECIDED)))
-            self.undecided += code == UNDECIDED
-            if not self.told[-1][2]:
-                said = 'undecided' if code == UNDECIDED else 'survives'
-                print(f'{said}: {place.module}.{words}', flush=True)
+            self.told.append((place, words, code not in ENDS))
+            if code in ENDS:
+                self.ends[ENDS[code]] += 1
+                print(f'{ENDS[code]}: {place.module}.{words}', flush=True)
         self.spent = time.monotonic() - begin
         return True
 
@@ -482,20 +479,21 @@ class Asked:
         except Exception as error:  # as an import would fail
             print(f'not put: {place}: {error!r}', flush=True)
             return 1
-        spent, own = 0.0, files_for(place)
+        spent, own, code = 0.0, files_for(place), 3
         of_room = self.of_room.get(room_of(place))
         for seconds, ran, item in sorted(
             reach, key=lambda each: each[2].path.relative_to(ROOT) not in own
         ):
             if of_room and item.path.relative_to(ROOT) not in of_room:
                 continue
-            inside = not isinstance(top, Function) or (file, first) in ran
-            if inside and fails(item):
-                return 1
-            spent += seconds * inside
+            if isinstance(top, Function) and (file, first) not in ran:
+                continue
             if spent > SPENT:
-                return UNDECIDED
-        return SURVIVES
+                return 2
+            if fails(item):
+                return 1
+            spent, code = spent + seconds, 0
+        return code
 
 
 def fails(item: Any) -> bool:
@@ -546,20 +544,6 @@ def room_of(place: Place) -> str:
     return '.'.join(place.module.split('.')[:2])
 
 
-def drawn_from(every: Sequence[Place], count: int, seed: int, *, in_turn: bool) -> list[Place]:
-    """Return so many places, 0 for all; from each room in turn, or wherever they lie."""
-    draw, most = random.Random(seed), min(count or len(every), len(every))
-    mixed = draw.sample(every, len(every))
-    if not in_turn:
-        return mixed[:most]
-    turns = Counter[str]()
-    keyed = []
-    for place in mixed:
-        turns[room_of(place)] += 1
-        keyed.append((turns[room_of(place)], place))
-    return [place for _, place in sorted(keyed, key=lambda each: each[0])[:most]]
-
-
 def spread(every: Sequence[Place], files: dict[str, Path], count: int, seed: int) -> list[Place]:
     """Return so many places, each room its share of them by its lines."""
     draw, inside = random.Random(seed), dict[str, list[Place]]()
@@ -600,7 +584,7 @@ def told(asked: Asked, least: float) -> int:
     share = caught.total() / max(total.total(), 1)
     print(
         f'{caught.total()} of {total.total()} mutants caught ({share:.0%}), {aside} more set aside, '
-        f'{asked.undecided} undecided, in {asked.spent:.0f} s, of the processor {worked():.0f} s'
+        f'{dict(asked.ends)}, in {asked.spent:.0f} s, of the processor {worked():.0f} s'
     )
     return int(share < least)
 
@@ -629,10 +613,9 @@ def main() -> int:
     os.chdir(ROOT)
     import pytest
 
-    whole, product = args.room == [EVERY], args.room == [PRODUCT]
-    packages = sorted(place.name for place in (ROOT / 'src').iterdir())
-    rooms = packages if whole else args.room or [ENGINE]
+    product, rooms = args.room == [PRODUCT], args.room or [ENGINE]
     if product:
+        packages = sorted(place.name for place in (ROOT / 'src').iterdir())
         rooms = [name for name in packages if name != PROOFS]
     files = modules(rooms)
     trees = {name: ast.parse(file.read_text(encoding='utf-8')) for name, file in files.items()}
@@ -640,7 +623,8 @@ def main() -> int:
     if product:
         drawn = spread(every, files, args.draw, args.seed)
     else:
-        drawn = drawn_from(every, args.draw, args.seed, in_turn=whole)
+        mixed = random.Random(args.seed).sample(every, len(every))
+        drawn = mixed[: args.draw or None]
     of_room: dict[str, set[Path]] = {}
     for place in drawn if args.tests is None else ():
         of_room.setdefault(room_of(place), set()).update(files_for(place))

@@ -141,6 +141,29 @@ def test_a_pose_is_written_next_to_the_numbers_it_replaces(notation, vector, far
     np.testing.assert_allclose(same, first, atol=1e-5)
 
 
+@pytest.mark.parametrize('pitch', [90.0, -90.0])
+@pytest.mark.parametrize(('notation', 'about_z'), [(KUKA_POSE, 3), (FANUC_POSE, 5)])
+def test_where_two_angles_turn_about_one_axis_that_about_z_stays_as_it_was(
+    notation, about_z, pitch
+):
+    old = [1.0, 2.0, 3.0, 20.0, pitch, -40.0]
+    pose = notation.value(old)
+    np.testing.assert_allclose(notation.numbers(pose, old), old, atol=1e-6)
+    old[about_z] += 5.0
+    again = notation.numbers(pose, old)
+    assert again[about_z] == old[about_z]
+    np.testing.assert_allclose(notation.value(again), pose, atol=1e-9)
+
+
+@pytest.mark.parametrize('turns', [0, 1, -2])
+@pytest.mark.parametrize('off', [0.3, -0.3])
+def test_a_rotation_vector_of_more_than_a_turn_stays_next_to_the_old_one(turns, off):
+    axis, angle = np.array([0.6, 0.0, 0.8]), 3.0 + 2.0 * np.pi * turns
+    pose = UR_POSE.value([0.0, 0.0, 0.0, *(angle * axis)])
+    found = UR_POSE.numbers(pose, [0.0, 0.0, 0.0, *((angle + off) * axis)])
+    np.testing.assert_allclose(found[3:], angle * axis, atol=1e-9)
+
+
 def test_both_euler_triples_of_one_turn_are_left_as_the_program_wrote_them():
     one, other = [0.0] * 3 + [170.0, 100.0, -20.0], [0.0] * 3 + [-10.0, 80.0, 160.0]
     np.testing.assert_allclose(KUKA_POSE.value(one), KUKA_POSE.value(other), atol=1e-12)

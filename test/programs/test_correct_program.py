@@ -190,7 +190,8 @@ def test_the_correction_of_another_program_is_not_replaced(tmp_path):
     assert said.code == 2 and 'holds the correction of seam.script' in said.err
     assert (tmp_path / 'out' / 'seam.script').read_bytes() == written
     assert corrected(tmp_path, SEAM).code == 0
-    assert corrected(tmp_path, SEAM, '--force', name='other.script').code == 0
+    said = corrected(tmp_path, SEAM, '--force', name='other.script')
+    assert said.code == 0 and 'the correction of seam.script was removed' in said.out
 
 
 def test_a_model_that_is_replaced_while_a_program_is_corrected_is_refused(tmp_path, monkeypatch):

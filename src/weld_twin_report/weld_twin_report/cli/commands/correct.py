@@ -44,8 +44,12 @@ def run(given: Given) -> int:
         given.refuse(of_program, f"is of a program; '{given.program}' is a bag")
         return _corrected_bag(given)
     given.refuse(names_of(TOPICS), f"is of a bag; '{given.program}' is none")
-    if not given.force:
-        _refuse_another(Path(given.out), what)
+    removed = _another(Path(given.out), what)
+    if removed and not given.force:
+        raise DataError(
+            f"'{given.out}' holds the correction of {removed}, which would be removed; give "
+            f'{what.name} a folder of its own'
+        )
     if given.model:
         content = _correction_in(what.resolve().parent)
         moves = content.get('moves', ())
@@ -59,11 +63,17 @@ def run(given: Given) -> int:
     context = context._replace(beside=programs_beside(given.program, language))
     program = read_program(given.program, context, language)
     if given.model:
-        return _by_model(given, context, program, inputs)
-    entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
-    texts = {source.name: source.text.encode('latin-1') for source in program.sources}
-    given.write_results(RESULT, '', entry | {'language': language, 'model': None}, texts.items())
-    print(f'{given.out}: {len(program.steps)} moves in {language}, unchanged; no model was given')
+        _by_model(given, context, program, inputs)
+    else:
+        entry: dict[str, Any] = {'schema': 'weld_twin/correction/1', 'language': language}
+        entry |= {'program': program.sources[0].name, 'model': None}
+        texts = {source.name: source.text.encode('latin-1') for source in program.sources}
+        given.write_results(RESULT, '', entry, texts.items())
+        print(
+            f'{given.out}: {len(program.steps)} moves in {language}, unchanged; no model was given'
+        )
+    if removed:
+        print(f"note: the correction of {removed} was removed from '{given.out}'")
     return 0
 
 
@@ -74,14 +84,10 @@ def _correction_in(folder: Path) -> dict[str, Any]:
         return {}
 
 
-def _refuse_another(out: Path, program: Path) -> None:
-    """Refuse the folder of another program, whose corrected file would go with its promise."""
-    there = _correction_in(out).get('program', program.name)
-    if there != program.name:
-        raise DataError(
-            f"'{out}' holds the correction of {there}, which would be removed; give {program.name} a "
-            'folder of its own'
-        )
+def _another(out: Path, program: Path) -> str:
+    """Return whose correction a folder holds, if another's: its file would go with its promise."""
+    there = str(_correction_in(out).get('program', program.name))
+    return '' if there == program.name else there
 
 
 def _corrected_bag(given: Given) -> int:
@@ -125,7 +131,7 @@ def _corrected_bag(given: Given) -> int:
     return 0
 
 
-def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs) -> int:
+def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs) -> None:
     from weld_twin_nodes.offline import correcting
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
@@ -163,7 +169,6 @@ def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs)
     for note in entry['notes']:
         print(f'note: {note}')
     given.say_page()
-    return 0
 
 
 def _length(text: str, option: str) -> float:

@@ -124,6 +124,19 @@ def test_what_moves_a_little_every_week_is_told_by_the_week_with_the_weeks_that_
     assert forecast(change, seen, result, {'tool_pose': 1.0}) is None
 
 
+def test_wear_that_goes_on_is_told_of_a_time_that_begins_after_it_did(url):
+    database = Database(url)
+    for week in range(13):
+        database.add('worn', entry(week, (ZERO,), (2e-5 * week,)))
+        database.add('hit', entry(week, (ZERO,), (3e-4 * (week > 4),)))
+    database.close()
+    later = ('--db', url, '--since', '2026-05-01', '--limit', 'joint_offset=6.4e-4')
+    said = done('history', 'changed', '--cell', 'worn', *later)
+    assert 'moves by 0.0200' in said and 'reaches 0.64 mrad in' in said
+    said = done('history', 'changed', '--cell', 'hit', *later)
+    assert said == 'hit: nothing changed by more than chance after 2026-05-01 in 13 diagnoses\n'
+
+
 def test_a_give_that_older_diagnoses_lack_is_no_change_of_the_arm():
     zero, give = ZERO, f'{GIVE}joint 3'
     entries = [entry(week, (zero,), (0.0,)) for week in range(3)]

@@ -276,7 +276,7 @@ def moved(change: Mapping[str, Any]) -> list[str]:
 
 
 def since(result: Sequence[Change], day: float | None) -> list[Change]:
-    """Return the changes that may have come after a day; seasons always."""
+    """Return the changes that may have come after a day, and those that go on: trends, seasons."""
     if day is None:
         return list(result)
-    return [each for each in result if each.kind == 'season' or each.between[1] > day]
+    return [each for each in result if each.kind != 'step' or each.between[1] > day]

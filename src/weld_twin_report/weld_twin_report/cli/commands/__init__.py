@@ -278,7 +278,7 @@ DIAGNOSIS ...            diagnosis.json, or the directory that diagnose wrote; o
 """
 _CHANGED = f"""
 {_CELL}
---since DATE             only what changed after it
+--since DATE             only what changed after it, or goes on, as wear and seasons do
 --limit EFFECT=VALUE     largest value allowed of an effect, SI units, such as backlash=0.0017; may be
                          given again
 --json                   print JSON instead of sentences

@@ -153,7 +153,8 @@ def changed(given: Given) -> int:
         return 0
     if not result:
         many = counted(len(seen), 'diagnosis', 'diagnoses')
-        print(f'{given.cell}: nothing changed by more than chance in {many}')
+        after = f' after {given.since}' if everything else ''
+        print(f'{given.cell}: nothing changed by more than chance{after} in {many}')
     for change, ahead in pairs:
         print(f'{given.cell}: {words.sentence(change)}')
         if ahead is not None:

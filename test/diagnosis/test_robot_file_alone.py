@@ -18,7 +18,14 @@ from diagnosis_cells import all_but
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, load
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.effects import Drift, InstrumentKnock, JointCompliance, JointSlip, ToolSlip
+from weld_twin_core.effects import (
+    Drift,
+    InstrumentKnock,
+    JointCompliance,
+    JointSlip,
+    LinkWarmUp,
+    ToolSlip,
+)
 from weld_twin_core.effects.dated import from_now_on
 from weld_twin_lab.programs.plain import _frames, tool_pose
 from weld_twin_msgs_py.bags import write_recording
@@ -27,7 +34,7 @@ from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.robots import read_robot_yaml, write_robot_yaml
 from weld_twin_nodes.offline.correcting import program_model
 from weld_twin_nodes.offline.exports import write_all
-from weld_twin_nodes.offline.given_twin import build_twin, left_behind
+from weld_twin_nodes.offline.given_twin import build_twin, since_recorded
 
 KINDS = ('joint_offset', 'link_length', 'link_offset', 'joint_compliance')
 LOAD, YIELDS, LONGER, G = 12.0, 4e-6, 5e-4, 9.80665
@@ -167,13 +174,15 @@ def test_files_live_twin_and_programs_have_what_slipped_as_it_is_since(tmp_path)
     since = Twin(NOMINAL, [*(replace(slip, time=-1.0) for slip in slips), found[-1]])
     live = build_twin(NOMINAL, file)
     assert_same_tool(live, since)
-    (said,) = left_behind(read_diagnosis(file), live.effects)
+    (said,) = since_recorded(read_diagnosis(file), live.effects)
     assert 'drift of the frame grew with the time' in said
     # One that is given for today does not stand for the one that was recorded.
     today = build_twin(NOMINAL, file, '[{effect: drift, xyz_rate: [0.0, 2.0e-6, 0.0]}]')
     assert today.effects[-1].name == 'drift'
-    assert left_behind(read_diagnosis(file), today.effects) == [said]
-    assert left_behind(read_diagnosis(file), found) == []
+    assert since_recorded(read_diagnosis(file), today.effects) == [said]
+    assert since_recorded(read_diagnosis(file), found) == []
+    warm = {'model': {'found': [LinkWarmUp('joint_3', 1e-3, 60.0).to_mapping()]}}
+    assert 'warm-up of the link begins anew at the first stamp' in since_recorded(warm, ())[0]
     robot = read_robot_yaml(tmp_path / 'robot.yaml')
     left = read_effects(tmp_path / 'robot_effects.yaml', robot)
     assert_same_tool(Twin(robot, from_now_on(left)), since)

@@ -45,6 +45,7 @@ SAID = yaml.safe_load("""
 - [{effect: drift, xyz_rate: [1.0e-06, 0.0, 0.0]}, ['(+3.60, 0, 0) mm per hour']]
 - - {effect: thermal_growth, coefficient: 1.2e-05, links: [elbow_joint]}
   - [+0.0120 mm per m and K for elbow_joint]
+- [{effect: thermal_growth, coefficient: 1.2e-05, warmup: 10.0}, [+0.120 mm per m while it warms]]
 - - {effect: transmission_ripple, joint: elbow_joint, amplitude: [0.0001, 0.0005], order: [4.0,
     9.0], phase: [0.0, 1.0]}
   - ['0.029 deg at 9 per turn, 0.0057 deg at 4 per turn']

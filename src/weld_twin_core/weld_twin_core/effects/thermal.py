@@ -241,12 +241,12 @@ class ThermalGrowth(_Warming):
                 yield cls(warmup=_RISE, warming_time=constant)
 
     def remedy(self, robot: Robot) -> str:
-        links = self.links or ('all links',)
-        grown = self._plain('coefficient') * 1e3
-        return (
-            f'Warm the arm up before welding, or compensate {number(grown)} mm per m and K for '
-            f'{", ".join(links)}.'
-        )
+        grown, each = self._plain('coefficient') * 1e3, 'm and K'
+        if self._curve is not None:
+            grown, each = grown * self._curve[0], 'm while it warms'
+        links = ', '.join(self.links or ('all links',))
+        way = f'compensate {number(grown)} mm per {each} for {links}'
+        return f'Warm the arm up before welding, or {way}.'
 
 
 class _WarmUp(_Warming):

@@ -328,10 +328,10 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
 
 def say_doubts(robot: Robot, effects: Sequence[Effect], path: str, robot_file: str = '') -> None:
     """Say on stderr what in a model may be a slip of its file, and that the robot's was changed."""
-    from ..offline.given_twin import changed_robot, diagnosis_of, doubts, left_behind
+    from ..offline.given_twin import changed_robot, diagnosis_of, doubts, since_recorded
 
     content = diagnosis_of(path)
-    said = changed_robot(content, robot_file) + left_behind(content, effects)
+    said = changed_robot(content, robot_file) + since_recorded(content, effects)
     for doubt in said + doubts(robot, effects):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
 

@@ -38,7 +38,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from ..offline.given_twin import changed_robot, diagnosis_of, doubts, left_behind
+from ..offline.given_twin import changed_robot, diagnosis_of, doubts, since_recorded
 from .cell_node import CellNode
 from .settings import NO_NUMBERS, Setting
 
@@ -282,7 +282,7 @@ def say_doubts(node: CellNode, robot: Robot, effects: Sequence[Effect]) -> None:
     """Warn of all in the node's model that may be a slip, and of joints that it was told otherwise."""
     path = node.setting('model')
     content = diagnosis_of(path)
-    said = changed_robot(content, node.setting('robot')) + left_behind(content, effects)
+    said = changed_robot(content, node.setting('robot')) + since_recorded(content, effects)
     for doubt in said + doubts(robot, effects):
         node.warn(doubt, doubt)
     if (content.get('model') or {}).get('counted') is not None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.cameras import Camera, Target
-from weld_twin_core.effects import REGISTRY, Effect, effects_from_list
+from weld_twin_core.effects import REGISTRY, Effect, effect_from_mapping, effects_from_list
 from weld_twin_core.effects.compliance import LOAD_OF_EFFORT
 from weld_twin_core.effects.dated import from_now_on
 from weld_twin_core.effects.plausible import beyond
@@ -30,7 +30,7 @@ for radians are 57 times, millimetres taken for metres a thousand times too larg
 def build_twin(
     robot: Robot,
     # An effects file, or a diagnosis (``.json``) with what it found, as that acts after the
-    # recordings (`from_now_on`, `left_behind`); empty for none.
+    # recordings (`from_now_on`, `since_recorded`); empty for none.
     model: Path | str = '',
     effects: str = '',  # more effects, in the form of an effects file
     *,
@@ -104,19 +104,28 @@ def changed_robot(content: Mapping[str, Any], path: str) -> list[str]:
     ]
 
 
-def left_behind(content: Mapping[str, Any], effects: Sequence[Effect]) -> list[str]:
-    """Return in a sentence each what a diagnosis found and effects that go on from it are without."""
-    there = [effect.to_mapping() for effect in effects]
-    left = (
-        REGISTRY[str(entry['effect'])].traits
-        for entry in entries_of(content)
-        if entry not in there
-    )
+def since_recorded(content: Mapping[str, Any], effects: Sequence[Effect]) -> list[str]:
+    """Return what a diagnosis found and effects that go on from it have not, or have begin anew."""
+    entries = entries_of(content)
+    present = [effect.to_mapping() for effect in effects]
+    absent = [REGISTRY[str(e['effect'])].traits for e in entries if e not in present]
     return [
         f'{title} grew with the time while it was recorded, and nobody knows how large it is now: it is '
         'left out, as at the first stamp of the recording'
-        for title in sorted({traits.title for traits in left if traits.endless})
+        for title in sorted({traits.title for traits in absent if traits.endless})
+    ] + [
+        f'{title} begins anew at the first stamp of what is predicted or corrected, as of an arm that '
+        'is cold there; record one that is warm, and diagnose that, for an arm that is at work'
+        for title in sorted(
+            {e.traits.title for e in map(effect_from_mapping, entries) if _warms(e)}
+        )
     ]
+
+
+def _warms(effect: Effect) -> bool:
+    """Return whether an effect of the robot goes with the time since the first stamp, to an end."""
+    it = effect.traits
+    return effect.on == 'time' and not (it.of_setup or it.endless or it.dated)
 
 
 def doubts(robot: Robot, effects: Sequence[Effect]) -> list[str]:

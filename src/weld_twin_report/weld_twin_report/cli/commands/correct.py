@@ -20,8 +20,8 @@ from weld_twin_nodes.cli.parsing import names_of
 from weld_twin_nodes.offline.given_twin import (
     changed_robot,
     diagnosis_of,
-    left_behind,
     other_readings,
+    since_recorded,
 )
 
 from . import OF_PROGRAM
@@ -148,7 +148,7 @@ def _by_model(given: Given, context: Context, program: Program, inputs: _Inputs)
     )
     entry = correcting.correction_entry(made, robot, caps) | {'way': correcting.way(made, model)}
     entry['notes'] += correcting.other_causes(content) + changed_robot(content, given.robot)
-    entry['notes'] += left_behind(content, model.effects)
+    entry['notes'] += since_recorded(content, model.effects)
     if given.tolerance:
         tolerance = _length(given.tolerance, '--tolerance')
         noise = _length(given.noise or NOISE, '--noise')

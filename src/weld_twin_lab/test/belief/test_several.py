@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
-from weld_twin_lab.belief.judged import VISIBLE, complete, kept, sets_hold, shown, whole
+from weld_twin_lab.belief.judged import (
+    VISIBLE,
+    alike_by_structure,
+    complete,
+    kept,
+    sets_hold,
+    shown,
+    whole,
+)
 from weld_twin_lab.belief.trial import (
     CROWDED,
     MOST,
@@ -181,3 +189,10 @@ def test_where_one_of_several_causes_has_no_name_the_rest_is_told_and_the_whole_
     (nameless,) = (s for s in row['statements'] if s['kind'] == 'nameless')
     assert nameless['probability'] > 0.5
     assert ['nameless', True] in [[kind, right] for kind, _, right, *_ in kept(row)['examples']]
+
+
+def test_a_wrong_zero_of_the_first_joint_is_one_error_with_a_base_that_is_turned():
+    """Of an arm without a positioner no other error is looked at that such a cell alone has."""
+    same = alike_by_structure('ur5', ('joint_offset', 'shoulder_pan_joint'))
+    assert {effect for effect, _ in same} >= {'joint_offset', 'base_pose'}
+    assert 'root_pose' not in {effect for effect, _ in same}

@@ -130,7 +130,7 @@ def _constants(robot: Robot) -> Iterator[Effect]:
             joints: Sequence[str | None] = (
                 robot.joint_names if kind.of in ('joint', 'link') else (None,)
             )
-            yield from (_built(kind, joint) for joint in joints)
+            yield from (_built(kind, joint) for joint in joints if kind.search.fits(robot, joint))
 
 
 def _built(kind: type[Effect], joint: str | None) -> Any:

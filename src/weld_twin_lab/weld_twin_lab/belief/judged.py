@@ -32,12 +32,13 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis
-from weld_twin_core.diagnosis.algebra.motions import same_error
+from weld_twin_core.diagnosis.algebra.motions import constant, same_error
 from weld_twin_core.diagnosis.calibration.features import WIDEST
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.diagnosis.result import Cause as Told
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.registry import REGISTRY
+from weld_twin_core.twin.features import joints_of
 
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, floor, record
 from ..blind.cause_sizes import SIZES, Cause, Site, site
@@ -101,7 +102,7 @@ def numbers(site: Site) -> int:
 def _alike(name: str, site: Site) -> tuple[Site, ...]:
     effect, joint = site
     kind = REGISTRY.get(effect)
-    if kind is None or not _constant(kind):
+    if kind is None or not constant(kind):
         return (site,)
     robot = catalog.load(name)
     own = _built(kind, joint)
@@ -120,17 +121,9 @@ def _levels(effect: str, joint: str | None, robot: str) -> Levels:
     return Levels(frozenset(places), frozenset({kind.traits.depends_on}))
 
 
-def _constant(kind: type[Effect]) -> bool:
-    return kind.traits.cause and kind.traits.depends_on == 'constant'
-
-
-def _constants(robot: Robot) -> Iterator[Effect]:
-    for kind in REGISTRY.values():
-        if _constant(kind):
-            joints: Sequence[str | None] = (
-                robot.joint_names if kind.of in ('joint', 'link') else (None,)
-            )
-            yield from (_built(kind, joint) for joint in joints if kind.search.fits(robot, joint))
+def _constants(robot: Robot) -> list[Effect]:
+    kinds = [kind for kind in REGISTRY.values() if constant(kind)]
+    return [_built(kind, joint) for kind in kinds for joint in joints_of(kind, robot)]
 
 
 def _built(kind: type[Effect], joint: str | None) -> Any:

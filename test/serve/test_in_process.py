@@ -215,3 +215,48 @@ def test_who_one_is_goes_along_with_a_key(app, kept):
         one.ask('/history/line%203'),
     ]
     kept('keys', '\n\n'.join(said) + '\n')
+
+
+class Connection:
+    """The server's side of a connection from a port of one address."""
+
+    def __init__(self, port):
+        self.port, self.said = port, []
+
+    def get_extra_info(self, _):
+        return '10.0.0.1', self.port
+
+    def write(self, data):
+        self.said.append(data.split(b'\r\n')[0].decode())
+
+    def close(self):
+        self.said.append('closed')
+
+    def abort(self):
+        self.said.append('gave way')
+
+
+def test_who_says_nothing_in_time_is_told_and_who_waits_longest_gives_way(monkeypatch):
+    from weld_twin_report.serve import access
+
+    monkeypatch.setattr(access, 'GRACE', 0.0)
+    silent, speaks, gone, first, second, third = (Connection(port) for port in range(1, 7))
+
+    async def run():
+        doors = access.Doors(of_address=3, of_all=100, head=0.05)
+        for each in (silent, speaks, gone):
+            doors.opened(each)
+        doors.began(('10.0.0.1', 2))
+        doors.closed(gone)
+        await asyncio.sleep(0.2)
+        doors.ended(('10.0.0.1', 2))  # its next request has its own time
+        doors = access.Doors(of_address=2, of_all=100, head=5.0)
+        for each in (first, second, third):
+            doors.opened(each)
+        await asyncio.sleep(0.2)
+
+    with ThreadPoolExecutor(1) as apart:
+        apart.submit(asyncio.run, run()).result()
+    assert silent.said == ['HTTP/1.1 408 Request Timeout', 'closed']
+    assert speaks.said == ['HTTP/1.1 408 Request Timeout', 'closed'] and gone.said == []
+    assert (first.said, second.said, third.said) == (['gave way'], [], [])

@@ -194,6 +194,14 @@ def test_the_correction_of_another_program_is_not_replaced(tmp_path):
     assert said.code == 0 and 'the correction of seam.script was removed' in said.out
 
 
+def test_a_folder_given_as_model_is_told_to_be_one(tmp_path):
+    (tmp_path / 'seam.script').write_text(SEAM)
+    (tmp_path / 'found').mkdir()
+    asked = words(tmp_path / 'seam.script', 'ur5', tmp_path / 'out', tmp_path / 'found')
+    said = weld_twin(*asked)
+    assert said.code == 2 and 'is a folder; give the diagnosis.json' in said.err
+
+
 def test_a_model_that_is_replaced_while_a_program_is_corrected_is_refused(tmp_path, monkeypatch):
     made = correcting.corrected_program
 

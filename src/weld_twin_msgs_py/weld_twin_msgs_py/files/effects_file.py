@@ -37,6 +37,10 @@ def read_effects(path: Path | str, robot: Robot) -> tuple[Effect, ...]:
         it goes with another robot; the message names file and entry.
 
     """
+    if Path(path).is_dir():
+        raise ModelError(
+            f"'{path}' is a folder; give the diagnosis.json or the effects file in it"
+        )
     text = read_text(path, 'effects file')
     entries = parse_yaml(text, f"effects file '{path}'")
     for word, kinematics in _HEAD.findall(text):

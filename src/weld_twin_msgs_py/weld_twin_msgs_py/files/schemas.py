@@ -151,7 +151,8 @@ def _of_type(annotation: str) -> Schema:
         'Sequence[str]': {'type': 'array', 'items': TEXT},
         'Array': _vector(3, '[m]'),
     }
-    return known[annotation.removesuffix(' | None')]
+    ways = [known[each] for each in annotation.split(' | ') if each != 'None']
+    return ways[0] if len(ways) == 1 else {'anyOf': ways}
 
 
 def _seam() -> Schema:

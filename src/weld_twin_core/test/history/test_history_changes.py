@@ -65,13 +65,19 @@ def test_a_step_of_four_standard_errors_is_found_within_three_recordings(seed):
     assert found[0].std < error
 
 
-def test_two_steps_of_one_coordinate_are_as_well_known_as_one():
-    """Of an instant at which the other step is nothing is left to be known."""
+@pytest.mark.parametrize('finer', [1.0, 1e6])
+def test_two_steps_of_one_coordinate_are_as_well_known_as_one(finer):
+    """Of an instant at which the other step is nothing is left to be known, but rounding."""
     error = np.sqrt(year(3)[30].covariance[5, 5])
     up, down = only(5, 4.0 * error, 12), only(5, -4.0 * error, 26)
-    found = changes(year(3, lambda week: up(week) + down(week), weeks=40))
+    seen = [
+        replace(each, value=each.value / finer, covariance=each.covariance / finer**2)
+        for each in year(3, lambda week: up(week) + down(week), weeks=40)
+    ]
+    with np.errstate(invalid='raise'):
+        found = changes(seen)
     assert [each.name for each in found] == [NAMES[5]] * 2
-    assert all(each.std < error for each in found)
+    assert all(each.std * finer < error for each in found)
 
 
 def test_a_trend_on_top_of_another_is_told_as_such():

@@ -381,8 +381,9 @@ class _System:
         sizes, variances = [], []
         for k in shapes:
             shape = self._series.shapes[k]
-            mean, information = self._size(k, thing)
-            covariance = np.linalg.inv(information / scatter + self._believed(shape, places))
+            mean, _ = self._size(k, thing)
+            shown, axes = self._shown(k, thing, scatter)
+            covariance = (axes / (1.0 + shown)) @ axes.T
             columns = shape.columns.shape[1]
             # Of a season, how far it swings; the worse known of its two parts says how well.
             each = mean.reshape(columns, -1)
@@ -405,14 +406,20 @@ class _System:
 
     def odds(self, shape: int, thing: int, scatter: float) -> float:
         """Return the logarithm of the odds of a shape on a thing against none, its prior in."""
-        mean, information = self._size(shape, thing)
-        known = information / scatter
+        mean, _ = self._size(shape, thing)
+        shown, axes = self._shown(shape, thing, scatter)
         prior = self._believed(self._series.shapes[shape], self._series.things[thing])
-        shown = known @ mean
-        fall = shown @ np.linalg.solve(known + prior, shown)
-        return 0.5 * float(
-            fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1]
-        )
+        fall = (shown * (axes.T @ prior @ mean)) ** 2 / (1.0 + shown)
+        return 0.5 * float(fall.sum() - np.log1p(shown).sum())
+
+    def _shown(self, shape: int, thing: int, scatter: float) -> tuple[Array, Array]:
+        """Return what data show along axes beside a precision of 1 before them, (L,), (m s, L)."""
+        _, information = self._size(shape, thing)
+        prior = self._believed(self._series.shapes[shape], self._series.things[thing])
+        width = 1.0 / np.sqrt(np.diag(prior))
+        shown, axes = np.linalg.eigh(information / scatter * np.outer(width, width))
+        # Of what nobody has seen there is rounding alone, on either side of zero.
+        return np.maximum(shown, 0.0), width[:, None] * axes
 
     @cached_property
     def _fits(self) -> list[list[tuple[Array, Array]]]:

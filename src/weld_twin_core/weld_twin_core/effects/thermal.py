@@ -16,7 +16,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +70,6 @@ class _Warming(Effect):
 
     warming_time: Value
 
-    options: ClassVar[tuple[str, ...]]
     fit = Hooked(_Fit)
 
     @property
@@ -130,8 +129,8 @@ class _Warming(Effect):
         return entry if self._timed else {k: v for k, v in entry.items() if k != 'warming_time'}
 
 
-def _lengths_of_recording(view: View) -> list[float]:
-    """Return the time constants [s] that a search starts from: fast, usual and slow."""
+def _time_constants(view: View) -> list[float]:
+    """Return the time constants [s] that a search starts from, by how long the recording is."""
     span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
     return [share * span for share in _CONSTANTS]
 
@@ -237,7 +236,7 @@ class ThermalGrowth(_Warming):
         if view.temperature is not None:
             yield cls()
         else:
-            for constant in _lengths_of_recording(view):
+            for constant in _time_constants(view):
                 yield cls(warmup=_RISE, warming_time=constant)
 
     def remedy(self, robot: Robot) -> str:
@@ -289,7 +288,7 @@ class _WarmUp(_Warming):
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
         kind: Any = cls  # whose first fields are joint, size and time constant
-        for constant in _lengths_of_recording(view):
+        for constant in _time_constants(view):
             yield kind(str(joint), 0.0, constant)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
             yield kind(str(joint), follows=(_REFERENCE, rise))

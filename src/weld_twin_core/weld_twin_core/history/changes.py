@@ -123,7 +123,9 @@ def changes(
         return ()
     shapes = series.shapes
     tests = max(len(shapes), _TRIED) * len(series.things)
-    sooner = np.array([_sooner(series, shape.kind, named, likely, slow) for shape in shapes])
+    kinds = {shape.kind for shape in shapes}
+    believed = {kind: _sooner(series, kind, named, likely, slow) for kind in kinds}
+    sooner = np.array([believed[shape.kind] for shape in shapes])
     # The last few diagnoses hardly tell a step from a trend; a step is the simpler.
     simple = np.array(
         [
@@ -152,7 +154,7 @@ def _sooner(
     likely: Collection[str],
     slow: Collection[str],
 ) -> list[float]:
-    """Return the log prior odds of every thing before others that explain as much."""
+    """Return the log prior odds that every thing changes in this way, of those that explain as much."""
     able = set(likely) - set(slow) if kind == 'step' else set(likely)
     names = [{series.names[k] for k in places} for places in series.things]
     return [_NAMED * bool(of & set(named)) + _LIKELY * bool(of & able) for of in names]
@@ -381,8 +383,8 @@ class _System:
         sizes, variances = [], []
         for k in shapes:
             shape = self._series.shapes[k]
-            mean, _ = self._size(k, thing)
-            shown, axes = self._shown(k, thing, scatter)
+            mean, information = self._size(k, thing)
+            shown, axes = _shown(information / scatter, self._believed(shape, places))
             covariance = (axes / (1.0 + shown)) @ axes.T
             columns = shape.columns.shape[1]
             # Of a season, how far it swings; the worse known of its two parts says how well.
@@ -406,20 +408,11 @@ class _System:
 
     def odds(self, shape: int, thing: int, scatter: float) -> float:
         """Return the logarithm of the odds of a shape on a thing against none, its prior in."""
-        mean, _ = self._size(shape, thing)
-        shown, axes = self._shown(shape, thing, scatter)
+        mean, information = self._size(shape, thing)
         prior = self._believed(self._series.shapes[shape], self._series.things[thing])
+        shown, axes = _shown(information / scatter, prior)
         fall = (shown * (axes.T @ prior @ mean)) ** 2 / (1.0 + shown)
         return 0.5 * float(fall.sum() - np.log1p(shown).sum())
-
-    def _shown(self, shape: int, thing: int, scatter: float) -> tuple[Array, Array]:
-        """Return what data show along axes beside a precision of 1 before them, (L,), (m s, L)."""
-        _, information = self._size(shape, thing)
-        prior = self._believed(self._series.shapes[shape], self._series.things[thing])
-        width = 1.0 / np.sqrt(np.diag(prior))
-        shown, axes = np.linalg.eigh(information / scatter * np.outer(width, width))
-        # Of what nobody has seen there is rounding alone, on either side of zero.
-        return np.maximum(shown, 0.0), width[:, None] * axes
 
     @cached_property
     def _fits(self) -> list[list[tuple[Array, Array]]]:
@@ -456,6 +449,14 @@ class _System:
             safe = information + SHOWN * (span[:, None] * prior)[..., None] * np.eye(size)
             towards = np.moveaxis(right[..., at], 1, 2).reshape(count, things, size, 1)
             yield np.linalg.solve(safe, towards)[..., 0], information
+
+
+def _shown(information: Array, prior: Array) -> tuple[Array, Array]:
+    """Return what data show along axes beside a precision of 1 before them, (L,), (m s, L)."""
+    width = 1.0 / np.sqrt(np.diag(prior))
+    shown, axes = np.linalg.eigh(information * np.outer(width, width))
+    # Of what nobody has seen there is rounding alone, on either side of zero.
+    return np.maximum(shown, 0.0), width[:, None] * axes
 
 
 def _found(counts: Sequence[int], index: int) -> tuple[int, int]:

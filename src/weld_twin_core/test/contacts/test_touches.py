@@ -73,6 +73,19 @@ def test_what_is_left_of_touches_depends_on_joints_alone(monkeypatch):
     assert told and all(name.endswith((' shoulder', ' elbow')) for name in told)
 
 
+def test_a_touch_left_out_does_not_help_to_find_its_pin():
+    """Else a handful of touches is foretold to a micrometre by anything that fits the others."""
+    postures = np.random.default_rng(1).uniform(0.5, 0.9, (8, 2))
+    recording = touching(two_links(), postures, ['pin'] * 8)
+    problem, bare = fitted(recording, two_links())
+    scale = Scale(SIGMA, 1.0, (np.ones(8),))
+    told = problem.measured_rows(Unseen.of(problem, scale, bare, np.zeros(0)).whole, scale)[0]
+    points = wt.Twin(two_links()).poses(recording, recording.joints.t).position
+    others = (points.sum(axis=0) - points) / 7
+    off = np.linalg.norm(points - others, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(told, axis=1), off, rtol=1e-6)
+
+
 def test_the_shoulder_offset_is_not_seen_by_a_pin():
     postures = np.array([[0.1, 1.2], [1.2, -1.2], [0.1, 1.2]])
     recording = touching(two_links(), postures, ['pin'] * 3)

@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from ...arm.channels import Shift
 from ...arm.robot import Robot
@@ -205,6 +206,20 @@ class Problem:
                 None if u is None else u.eliminated(np.sqrt(w) / scale.position) for u, w in pairs
             ]
         return self._taken[scale] if self.touched else []
+
+    def place_columns(self, scale: Scale) -> Array:
+        """
+        Return what places of contacts that nobody knows take up of whitened rows, (Z, rows).
+
+        Rows have lost it, found from all postures of a place. Who fits some of them finds it anew:
+        else those that are left out would be told by the place that they helped to find.
+        """
+        out = [np.zeros((0, c * m)) for c, m in zip(self.rows, self.samples, strict=True)]
+        for k, own in enumerate(self.places_taken(scale)):
+            if own is not None:
+                ways, remaining = own
+                out[k] = ways[remaining == 0.0]
+        return np.asarray(block_diag(*out))
 
     @cached_property
     def samples(self) -> tuple[int, ...]:

@@ -50,7 +50,7 @@ class Unseen:
     problem: Problem
     scale: Scale
     labels: Array  # stretch of every row, shape (rows,)
-    columns: Columns  # P columns: frames, then the coordinates of every found effect
+    columns: Columns  # P columns: places, frames, then the coordinates of every found effect
     parts: tuple[slice, ...]  # columns of every effect
     residual: Array  # the final residual, shape (rows,)
     taken: Callable[[], Array]
@@ -73,11 +73,15 @@ class Unseen:
             if same and np.array_equal(given, precision):
                 return made
         columns = designed(problem, fit.model, scale, fit.model.with_found(()))
+        places = problem.place_columns(scale)
+        if len(places):
+            columns = Columns((Piece(places), *columns.pieces))
         frames = columns.count - fit.coordinates.size
         sizes = (effect.fit.coordinates().size for effect in fit.model.found)
         ends = np.cumsum([frames, *sizes]).tolist()
         prior = np.zeros(columns.count)
-        prior[:frames], off = frame_prior(problem, fit.model)
+        prior[len(places) : frames], off = frame_prior(problem, fit.model)
+        off = np.concatenate([np.zeros(len(places)), off])
         if precision.size:
             prior[frames:] = precision
         # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.

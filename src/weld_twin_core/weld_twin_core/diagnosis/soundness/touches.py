@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ...contacts import Artefact, Contact, Contacts
+from ...contacts import Artefact, Contact, Contacts, Tie
 from ...recording import Recording
 from ..algebra.fit import robust_fit
 from ..algebra.independent_rows import robust_spread
@@ -45,11 +45,12 @@ class Touched(NamedTuple):
 
 def touches(problem: Problem, model: Model) -> Touched:
     """Return contacts as they are, and what was wrong with how they were called."""
-    plain = _fitted(problem, _with_plain_causes(problem, model))
+    untied = _untied(problem, model)
+    plain = _fitted(untied, _with_plain_causes(problem, model))
     # The noise of an instrument and that of contacts are told from each other in turn.
     for _ in range(0 if problem.untracked else 2):
         problem = replace(problem, loose=_loose(problem, problem.residuals(plain)))
-        plain = _fitted(problem, plain)
+        plain = _fitted(replace(untied, loose=problem.loose), plain)
     rows = problem.residuals(plain)
     every = {
         k: _Postures(r, plain.twin(k).poses(r, r.joints.t).position)
@@ -69,6 +70,23 @@ def touches(problem: Problem, model: Model) -> Touched:
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))
     return Touched(again, start, reported)
+
+
+def _untied(problem: Problem, model: Model) -> Problem:
+    """Return the problem without known lengths between points, which are held against the fit."""
+    recordings = []
+    for recording in problem.recordings:
+        if (contacts := recording.contacts) is not None:
+            artefact = contacts.artefact
+            ties = tuple(tie for tie in artefact.ties if not _between_points(artefact, tie))
+            contacts = replace(contacts, artefact=Artefact(artefact.contacts, ties))
+            recording = replace(recording, contacts=contacts)
+        recordings.append(recording)
+    return replace(problem, recordings=tuple(recordings)).touching(model)
+
+
+def _between_points(artefact: Artefact, tie: Tie) -> bool:
+    return artefact.named(tie.between[0]).kind == 'point'
 
 
 def _with_plain_causes(problem: Problem, model: Model) -> Model:
@@ -126,10 +144,11 @@ class _Postures:
                 continue
             yield mistake(
                 f'{one!r} and {other!r} are {tie.value * 1e3:.4g} mm apart by the artefact '
-                f'and {result * 1e3:.4g} mm by the postures: files or labels are mixed up.',
+                f'and {result * 1e3:.4g} mm by the postures: files or labels are mixed up, '
+                'or the length is wrong.',
                 'other',
                 tie.between,
-                'Check which file belongs to which contact, and the length in the artefact',
+                'Check which file belongs to which contact, and the length in the artefact [m]',
             )
 
     def resorted(self, middles: Mapping[str, Array], usual: float) -> Iterator[Unsound]:

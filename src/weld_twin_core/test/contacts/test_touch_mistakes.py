@@ -97,6 +97,20 @@ def test_swapped_files_are_not_mended(sound, robot):
     assert wrong[0].startswith("'a' and 'b' are 50 mm apart by the artefact and ")
 
 
+def test_a_length_that_was_measured_from_edge_to_edge_is_told_and_not_fitted(sound, robot):
+    """A few postures fit an arm as it is wanted: the length is held against what they tell alone."""
+    few = np.flatnonzero(np.arange(3 * EACH) % EACH < 5)
+    touched = sound.contacts.take(few)
+    wrong_length = Artefact(touched.artefact.contacts, (Tie(('a', 'b'), 0.055, 1e-4),))
+    motion = replace(sound.joints, t=sound.joints.t[few], q=sound.joints.q[few])
+    contacts = replace(touched, artefact=wrong_length)
+    _, mended, (wrong,) = told(replace(sound, joints=motion, contacts=contacts), robot)
+    assert mended == []
+    assert wrong.startswith("'a' and 'b' are 55 mm apart by the artefact and ")
+    by_postures = float(wrong.split('artefact and ')[1].split(' mm')[0])
+    assert by_postures == pytest.approx(50.0, abs=0.5)
+
+
 def test_recordings_of_one_instrument_have_one_noise_and_touches_their_own():
     touched = SimpleNamespace(freedom=90)  # of 120 numbers: the noise is twice what is left
     problem = SimpleNamespace(given=(0, 1, 2), contact=[None, None, touched].__getitem__)
@@ -163,6 +177,14 @@ def test_explanations_that_a_pin_does_not_part_are_parted_by_the_postures_propos
     assert apart['expected_separation_sigma'] > 1.0
     assert alike['expected_separation_sigma'] is None
     assert apart['motion']['q'] != alike['motion']['q']
+
+
+def test_what_no_touch_sees_is_no_reason_to_fail(robot):
+    """A tool that turned as time went on moves no tool point."""
+    problem, model, scale = touched(robot, PLACES, np.random.default_rng(3))
+    turned = wt.effects.FrameCurve((0.0,) * 6, (0.0,) * 6, (0.0, 20.0), 'time', 'tool')
+    motion = next_touches(problem, model.with_found((turned,)), (), scale)['motion']
+    assert len(motion['q']) == 12
 
 
 def test_touches_fitted_without_any_rest_are_no_reason_to_fail(robot):

@@ -196,6 +196,20 @@ def test_what_is_not_clear_is_told_in_a_sentence(tmp_path, log, seen, options, o
         read_two_tables(*both(tmp_path, log(), seen()), TableOptions(**options), offset)
 
 
+def test_rows_with_numbers_of_stations_are_paired_by_them(tmp_path):
+    """The instrument measured the stations in another order, and one less."""
+    number = np.arange(1.0, COUNT + 1)
+    log = 'No,' + ','.join(f'J{k} [deg]' for k in range(1, 7)) + '\n'
+    order = np.random.default_rng(4).permutation(COUNT)[1:]
+    seen = 'no,x [mm],y [mm],z [mm]\n' + lines(number[order], 1e3 * POINT[order])
+    recording, said = read_two_tables(*both(tmp_path, log + lines(number, np.degrees(Q)), seen))
+    kept = np.sort(order)
+    np.testing.assert_allclose(recording.joints.q, Q[kept], atol=1e-6)
+    np.testing.assert_allclose(recording.measured.position, POINT[kept], atol=1e-6)
+    paired = "rows of both files are paired by 'No'; 1 of the joints and 0 of the instrument"
+    assert any(sentence.startswith(paired) for sentence in said)
+
+
 def test_files_that_nothing_brings_together_are_refused(tmp_path):
     fewer = '\n'.join(spatial_analyzer().splitlines()[:-1]) + '\n'
     with pytest.raises(DataError, match='nothing says which belong together'):

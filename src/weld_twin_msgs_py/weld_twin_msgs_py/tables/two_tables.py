@@ -85,7 +85,15 @@ def read_two_tables(
 def _paired(
     log: Cells, seen: Cells, names: tuple[str, ...], options: TableOptions, said: list[str]
 ) -> Cells:
-    """Return one table of stations: row belongs to row."""
+    """Return one table of stations: by a name or number that both files have, else row by row."""
+    how = 'rows of both files are paired in their order'
+    if (named := _named_alike(log, seen, names)) is not None:
+        column, one, other = named
+        out = len(log.rows) - one.size, len(seen.rows) - other.size
+        log, seen = log.taken(one), seen.taken(other)
+        how = f'rows of both files are paired by {column!r}'
+        if any(out):
+            how += f'; {out[0]} of the joints and {out[1]} of the instrument have no partner'
     if len(log.rows) != len(seen.rows):
         raise DataError(
             f"'{log.path}' has {len(log.rows)} rows and '{seen.path}' {len(seen.rows)}, and "
@@ -93,8 +101,26 @@ def _paired(
             'for each station'
         )
     own = _stamps(seen, options, said)
-    said.append('rows of both files are paired in their order')
+    said.append(how)
     return _joined(log, seen, names, log.stack(names), own)
+
+
+def _named_alike(
+    log: Cells, seen: Cells, joints: tuple[str, ...]
+) -> tuple[str, NDArray[np.intp], NDArray[np.intp]] | None:
+    """Return a column of both files that tells their rows apart, and the rows that it pairs."""
+    headers = [name.casefold() for name in seen.header]
+    for k, name in enumerate(log.header):
+        if name in (*joints, *time_columns(log.header)) or name.casefold() not in headers:
+            continue
+        at = headers.index(name.casefold())
+        own, others = [row[k] for row in log.rows], {row[at]: i for i, row in enumerate(seen.rows)}
+        both = [(i, others[text]) for i, text in enumerate(own) if text and text in others]
+        single = len(set(own)) == len(own) and len(others) == len(seen.rows)
+        if single and 2 * len(both) > min(len(own), len(others)):
+            one, other = np.array(both, dtype=np.intp).T
+            return name, one, other
+    return None
 
 
 def _between(log: Cells, seen: Cells, names: tuple[str, ...], times: Array, own: Array) -> Cells:

@@ -111,6 +111,23 @@ def test_a_length_that_was_measured_from_edge_to_edge_is_told_and_not_fitted(sou
     assert by_postures == pytest.approx(50.0, abs=0.5)
 
 
+def test_touches_that_no_arm_makes_are_told_and_not_explained(sound, robot):
+    """Places of a drawing in mm, or in the frame of the table."""
+    contacts = sound.contacts
+    for at, told_apart in (
+        ({k: 1e3 * np.array(p) for k, p in SOCKETS.items()}, True),
+        ({k: np.array([p[1] + 0.3, -p[0], p[2] + 0.8]) for k, p in SOCKETS.items()}, True),
+        (SOCKETS, False),
+    ):
+        known = Artefact(tuple(Contact(k, at=tuple(map(float, p))) for k, p in at.items()))
+        placed = replace(sound, contacts=replace(contacts, artefact=known))
+        _, mended, wrong = told(placed, robot)
+        assert mended == []
+        assert [m.startswith('No place of what was touched and no ') for m in wrong] == [
+            True
+        ] * told_apart
+
+
 def test_recordings_of_one_instrument_have_one_noise_and_touches_their_own():
     touched = SimpleNamespace(freedom=90)  # of 120 numbers: the noise is twice what is left
     problem = SimpleNamespace(given=(0, 1, 2), contact=[None, None, touched].__getitem__)

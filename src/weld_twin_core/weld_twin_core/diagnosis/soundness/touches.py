@@ -26,7 +26,7 @@ from ..algebra.motions import plain_causes
 from ..algebra.posed import FEWEST
 from ..algebra.problem import ROWS, Model, Problem
 from ..frames.aligned import aligned
-from ..limits import CLEAR, FEW, LARGE, RUN, STRAY, TINY, UNDONE, WORTH
+from ..limits import CLEAR, FEW, LARGE, RUN, STRAY, TINY, UNDONE, UNEXPLAINED, WORTH
 from ..result import Unsound
 from .evidence import Finding, mistake
 
@@ -46,7 +46,8 @@ class Touched(NamedTuple):
 def touches(problem: Problem, model: Model) -> Touched:
     """Return contacts as they are, and what was wrong with how they were called."""
     untied = _untied(problem, model)
-    plain = _fitted(untied, _with_plain_causes(problem, model))
+    # Frames first: a tool point that is off by a hand's breadth is no error of the arm.
+    plain = _fitted(untied, _with_plain_causes(problem, _fitted(untied, model)))
     # The noise of an instrument and that of contacts are told from each other in turn.
     for _ in range(0 if problem.untracked else 2):
         problem = replace(problem, loose=_loose(problem, problem.residuals(plain)))
@@ -62,6 +63,8 @@ def touches(problem: Problem, model: Model) -> Touched:
     if broken:
         return Touched(problem, model, mistakes=broken)
     usual = float(np.median(np.concatenate([np.linalg.norm(rows[k], axis=0) for k in every])))
+    if usual > UNEXPLAINED:
+        return Touched(problem, model, mistakes=(_apart(usual),))
     reported = tuple(each for own in every.values() for each in own.resorted(middles, usual))
     if not reported:
         return Touched(problem, model)
@@ -70,6 +73,17 @@ def touches(problem: Problem, model: Model) -> Touched:
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))
     return Touched(again, start, reported)
+
+
+def _apart(usual: float) -> Finding:
+    return mistake(
+        f'No place of what was touched and no plausible arm brings the tool point nearer than '
+        f'{usual * 1e3:.3g} mm (median) to what it touched.',
+        'other',
+        (),
+        'Check units (the artefact is in m), the joints, the tool of the robot file, and in which '
+        'frame places are known',
+    )
 
 
 def _untied(problem: Problem, model: Model) -> Problem:

@@ -86,7 +86,7 @@ class Traits:
     by_motion: bool = False
     """Whether a joint must move for it to differ from a constant."""
     everywhere: bool = False
-    """Whether a prediction allows for it on every joint, or clock, where it was not found."""
+    """Whether a prediction allows for it on every joint, clock or instrument where it was not found."""
     lacking: str = ''
     """What is wrong where it does not fit, after its name; ``robot`` and ``site`` are theirs.
     Without, it is only not looked for there."""

@@ -46,6 +46,7 @@ class MeasurementScale(LinearEffect):
         depends_on='place',
         place='instrument',
         common=False,
+        everywhere=True,
     )
     of = 'robot'
     stage = Stage.POSE
@@ -215,6 +216,7 @@ class Drift(LinearEffect):
         endless=True,
         place='base',
         common=False,
+        everywhere=True,
     )
     of = 'robot'
     stage = Stage.POSE
@@ -269,6 +271,7 @@ class Refraction(LinearEffect):
         depends_on='place',
         place='instrument',
         common=False,
+        everywhere=True,
     )
     of = 'robot'
     stage = Stage.POSE

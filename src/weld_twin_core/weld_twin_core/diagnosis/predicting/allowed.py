@@ -50,7 +50,7 @@ from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
 from .leftover import Predicted, beyond_named, known_noise, leftover
-from .sizes import Prior, Products, Rows, Weighed, weighed, with_prior
+from .sizes import GEARS, Prior, Products, Rows, Weighed, weighed, with_prior
 
 POSTURES = 100
 """Enough for a median to be good to some per cent."""
@@ -84,7 +84,8 @@ def allowed(
     recordings = problem.recordings
     jumps = sum(shown(f, max(scale.position, MICROMETRE)) for f in problem.features(model))
     problem, scale = problem.thinned_with(_noisy(scale), ROWS)
-    what = _with_growth(_directions(problem, model), problem, model)
+    what = _directions(problem, model, measured=not problem.touched)
+    what = _with_growth(what, problem, model)
     prior = _prior(what, model)
     rows = _rows(problem, model, scale, what, prior)
     models = weighed(rows, prior, _expected(problem, scale))
@@ -159,11 +160,11 @@ def _noisy(scale: Scale) -> Scale:
     )
 
 
-def _directions(problem: Problem, model: Model) -> Directions:
+def _directions(problem: Problem, model: Model, *, measured: bool = False) -> Directions:
     return Directions(
         tuple(frame for frame in ('base', 'tool') if frame in problem.align),
         1 + max(problem.stand(k) for k in range(len(problem.recordings))),
-        plausible_arm.directions(model.robot, model.found),
+        plausible_arm.directions(model.robot, model.found, measured=measured),
         plausible_arm.fine_knots(_joints(problem)),
         0 if problem.at_rest else model.robot.n,
     )
@@ -311,19 +312,19 @@ def _uneven(coordinates: Array, what: Directions) -> Array:
 def _prior(what: Directions, model: Model) -> Prior:
     """Return the prior of frames, effects, gives, and the heights of every joint's fine curve."""
     frames, effects = what.frame_count, what.effects
-    group, gears = plausible_arm.groups(effects)
+    group, pools = plausible_arm.groups(effects)
     group[np.repeat([_only_grows(e, model) for e in effects], what.sizes)] = -1
     sizes = [k.size for k in what.knots]
     springs = int(what.gives > 0)
-    gives = np.full(what.gives, gears.size)
-    curves = gears.size + springs + np.repeat(np.arange(len(sizes)), sizes)
+    gives = np.full(what.gives, pools.size)
+    curves = pools.size + springs + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
     return Prior(
         np.concatenate([np.zeros(frames), tied, np.zeros(what.shapes)]),
         plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, gives, curves]).astype(int),
-        np.concatenate([gears, np.ones(springs + len(sizes), bool)]),
-        np.concatenate([np.zeros(gears.size + springs, bool), np.ones(len(sizes), bool)]),
+        np.concatenate([pools, np.full(springs + len(sizes), GEARS)]),
+        np.concatenate([np.zeros(pools.size + springs, bool), np.ones(len(sizes), bool)]),
     )
 
 

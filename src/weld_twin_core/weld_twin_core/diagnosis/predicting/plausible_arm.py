@@ -15,10 +15,13 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
+from ...effects.view import Stage
+from ...twin.compensation import acts
 from ...twin.directions import Directions, Discrepancy
 from ...twin.features import joints_of
 from ..algebra.fit import FRAME_SHIFT, FRAME_TURN
 from .leftover import Rest
+from .sizes import GEARS, GEOMETRY, MEASURING
 
 ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
@@ -40,10 +43,18 @@ MOST = 24
 """Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
 
 
-def directions(robot: Robot, result: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects whose coordinates are uncertain, at the values found or at zero."""
+def directions(
+    robot: Robot, result: Sequence[Effect], *, measured: bool = False
+) -> tuple[Effect, ...]:
+    """
+    Return the effects whose coordinates are uncertain, at the values found or at zero.
+
+    measured: whether an instrument saw the tool, which may be off by a little as well. What it is off by
+    looks like errors of the arm that no program needs corrected.
+    """
     out: list[Effect] = []
-    for kind in [kind for kind in REGISTRY.values() if kind.traits.everywhere]:
+    every = (kind for kind in REGISTRY.values() if kind.traits.everywhere)
+    for kind in [kind for kind in every if measured or not _of_the_measured(kind)]:
         for joint in joints_of(kind, robot):
             here = [e for e in result if (e.name, e.site) == (kind.name, joint)]
             if kind.traits.waves is None:
@@ -57,6 +68,11 @@ def directions(robot: Robot, result: Sequence[Effect]) -> tuple[Effect, ...]:
         if effect.traits.waves is None and counts and effect.key not in {e.key for e in out}:
             out.append(effect)
     return tuple(e for e in out if e.fit.coordinates().size)
+
+
+def _of_the_measured(kind: type[Effect]) -> bool:
+    """Return whether a kind moves what is measured and not the tool."""
+    return kind.stage == Stage.POSE and not acts(kind)
 
 
 def _none_yet(kind: type[Effect], joint: str | None) -> Effect:
@@ -89,14 +105,20 @@ def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
     return np.concatenate(out)
 
 
-def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the family of every coordinate, (K,), and which are a gear's, each one by itself."""
+def groups(effects: Sequence[Effect]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return the family of every coordinate, (K,), each gear by itself, and whose each is, (G,)."""
     names = [(e.name, None if e.traits.waves is None else e.site) for e in effects]
-    gears = {name: e.traits.waves is not None for name, e in zip(names, effects, strict=True)}
-    distinct = list(gears)
+    whose = {name: _whose(e) for name, e in zip(names, effects, strict=True)}
+    distinct = list(whose)
     sizes = [effect.fit.coordinates().size for effect in effects]
     numbers = np.repeat([distinct.index(name) for name in names], sizes).astype(int)
-    return numbers, np.array(list(gears.values()), dtype=bool)
+    return numbers, np.array(list(whose.values()), dtype=int)
+
+
+def _whose(effect: Effect) -> int:
+    if effect.traits.waves is not None:
+        return GEARS
+    return GEOMETRY if acts(effect) else MEASURING
 
 
 def widths(robot: Robot, what: Directions) -> Array:

@@ -7,7 +7,7 @@ No arm is exact, but most of what it could have it has next to nothing of. Every
 has one of a few sizes, and a model is a choice of sizes. Models are drawn as often as the recordings
 vouch for them: one size after the other given all other sizes [1]_, whatever the values of the
 coordinates are. Given its own value a coordinate that is small would hardly ever become large. What
-sizes are usual is learned along, family by family and from all families together. What no data could
+sizes are usual is learned along, family by family and from all families of a kind together. What no data could
 show, for it is one with a fitted frame or does nothing in them, is as wide as machines have it, but for
 what the others of its family show: that an arm is good in one thing is no witness of what nobody looked
 at.
@@ -43,7 +43,7 @@ BELIEF = np.array([0.1, 0.1, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
 """How often each size comes before anything is known of this arm. A judgement: real arms have a third
 of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
 POOLED, OWN = 3.0, 4.0
-"""So many coordinates' worth of belief in that, and in what all families together show, for each."""
+"""So many coordinates' worth of belief in that, and in what all families of a kind show, for each."""
 USUAL = SIZES[5]
 """Size, a third of what machines have, from which on an error is one that machines usually have."""
 SWEEPS, LEARNING = 100, 20
@@ -51,6 +51,7 @@ SWEEPS, LEARNING = 100, 20
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
 KEPT = LEARNING
 """Every so many models one is kept: it has forgotten the one before."""
+GEARS, GEOMETRY, MEASURING = range(3)
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
 
@@ -63,9 +64,9 @@ class Prior:
     width: Array  # standard deviation of a usual one, shape (P,)
     group: NDArray[np.int_]
     """Family, shape (P,); -1 for what is as wide as it is: frames, and links that grow, as all do."""
-    gears: NDArray[np.bool_]
-    """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
-    geometry."""
+    pool: NDArray[np.int_]
+    """Whose a family is, `GEARS`, `GEOMETRY` or `MEASURING`, shape (G,). How even gears are says nothing
+    of an arm's geometry, and neither of the instrument."""
     tied: NDArray[np.bool_]  # families whose coordinates all have one size, shape (G,)
 
 
@@ -201,7 +202,7 @@ class _Chain:
         off = np.log(np.maximum(np.abs(self.middle), EMPTY))[:, None] - np.log(SIZES)
         start = np.where(self.middle == 0.0, SIZES[2], SIZES[np.abs(off).argmin(axis=1)])
         self.size, self.noise = np.where(self.small, start, 1.0), self.expected
-        self.belief = np.tile(BELIEF, (prior.gears.size, 1))
+        self.belief = np.tile(BELIEF, (prior.pool.size, 1))
         n = prior.width.size
         zeros = (np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(2))
         self.seen = _Seen(*zeros)
@@ -245,8 +246,9 @@ class _Chain:
         seen.square += np.outer(mean, mean)
         seen.precision += size**-2.0
         seen.variance += size**2
-        usual, gear = size[self.counted] >= USUAL, self.prior.gears[self.prior.group[self.counted]]
-        seen.usual += [usual[part].mean() if part.any() else 0.0 for part in (gear, ~gear)]
+        usual, whose = size[self.counted] >= USUAL, self.prior.pool[self.prior.group[self.counted]]
+        parts = (whose == pool for pool in (GEARS, GEOMETRY))
+        seen.usual += [usual[part].mean() if part.any() else 0.0 for part in parts]
         seen.noise += self.noise
         seen.count += 1
 
@@ -312,13 +314,13 @@ class _Chain:
 
     def _usual(self) -> None:
         """Draw how often each size comes in every family."""
-        group, gears = self.prior.group, self.prior.gears
+        group, pools = self.prior.group, self.prior.pool
         counts = np.zeros(self.belief.shape)
         chosen = np.searchsorted(SIZES, self.size[self.counted])
         np.add.at(counts, (group[self.counted], chosen), 1.0)
         alike = counts[group[self.hidden]] + OWN * BELIEF
         self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
-        for part in (gears, ~gears):
+        for part in (pools == pool for pool in np.unique(pools)):
             common = counts[part].sum(axis=0) + POOLED * BELIEF
             drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
             drawn = np.maximum(drawn, EMPTY)

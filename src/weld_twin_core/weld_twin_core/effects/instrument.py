@@ -216,7 +216,6 @@ class Drift(LinearEffect):
         endless=True,
         place='base',
         common=False,
-        everywhere=True,
     )
     of = 'robot'
     stage = Stage.POSE

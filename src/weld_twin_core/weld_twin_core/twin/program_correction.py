@@ -545,10 +545,28 @@ def _drawn(
     return np.sqrt(squares @ share), np.sqrt(squares.max(axis=1))
 
 
+def on_seams(result: ProgramCorrection) -> list[NDArray[np.bool_]]:
+    """
+    Return which moves of every piece go along a corrected seam, each (K,).
+
+    How the arm comes to where a seam begins does not matter: a joint move that is the first of its seam.
+    A joint trajectory is a seam of joint moves.
+    """
+    begun, out = set[int](), []
+    for piece in result.travel.pieces:
+        along = []
+        for move in piece.moves:
+            led = move.kind != 'joint' or move.seam in begun
+            along.append(led and move.seam not in result.left)
+            begun.add(move.seam)
+        out.append(np.array(along, dtype=bool))
+    return out
+
+
 def along_seams(result: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
     """Return the accuracy along corrected seams, before and after; of all moves without any."""
     pieces = result.looks
-    ways = [_along(result, k) for k in range(len(pieces))]
+    ways = [_along(result, k, seams) for k, seams in enumerate(on_seams(result))]
     if not any(way.any() for way in ways):
         ways = [_ends(piece.motion.t.size, piece.ends) for piece in pieces]
     chosen = [way > 0.0 for way in ways]
@@ -563,11 +581,9 @@ def along_seams(result: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | 
     return before, after
 
 
-def _along(result: ProgramCorrection, k: int) -> Array:
+def _along(result: ProgramCorrection, k: int, seams: NDArray[np.bool_]) -> Array:
     """Return how much of the way along corrected seams the samples of a piece stand for, (N,) [m]."""
-    piece = result.looks[k]
-    seams = [move.kind != 'joint' and move.seam not in result.left for move in piece.moves]
-    steps = np.where(np.array(seams, dtype=bool)[piece.move], result.ways[k], 0.0)
+    steps = np.where(seams[result.looks[k].move], result.ways[k], 0.0)
     # A seam begins where the move before it ends.
     return np.asarray(0.5 * (steps + np.append(steps[1:], 0.0)))
 

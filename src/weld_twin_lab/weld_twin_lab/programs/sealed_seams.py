@@ -91,9 +91,18 @@ DECKS, APART = 4, 10**6
 TRIES = 40
 """Seams drawn for a robot before it is given up; many are out of its reach."""
 MEASURING = frozenset(
-    {'measurement_scale', 'refraction', 'drift', 'time_delay', 'clock_rate', 'measurement_noise'}
+    {
+        'measurement_scale',
+        'refraction',
+        'drift',
+        'time_delay',
+        'clock_rate',
+        'measurement_noise',
+        'wear',
+    }
 )
-"""Causes of the instrument: they are recorded, and the tool that is judged has none of them."""
+"""Causes of the instrument, and a tip that wears on: they are recorded, and the tool that is judged has
+none of them. How far it is worn when a program runs nobody knows, and whoever corrects one is told."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from weld_twin_core.twin.program_correction import (
     along_seams,
     conforms,
     correct_program,
+    on_seams,
 )
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
@@ -304,15 +305,11 @@ def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
 
     For each stretch ``tool`` (``T_flange_tool``), and ``meant`` and ``commanded``: poses in the base
     frame of the model by position [m] and rotation vector [rad], one for one. Along corrected
-    linear and circular moves; at the ends of all moves where there are none.
+    seams; at the ends of all moves where there are none.
     """
-    out = []
-    seams = any(
-        move.kind != 'joint' and move.seam not in made.correction.left
-        for piece in made.correction.travel.pieces
-        for move in piece.moves
-    )
-    for piece in made.correction.travel.pieces:
+    out, every = [], on_seams(made.correction)
+    seams = any(along.any() for along in every)
+    for piece, along in zip(made.correction.travel.pieces, every, strict=True):
         motion = repeated(model.robot, made.correction.program, piece)
         meant, commanded = model.wanted(piece), model.wanted(piece._replace(motion=motion))
         for k, move in enumerate(piece.moves):
@@ -320,7 +317,7 @@ def way(made: CorrectedProgram, model: ProgramModel) -> list[dict[str, Any]]:
             if not seams:
                 chosen = np.zeros(chosen.size, dtype=bool)
                 chosen[piece.ends[k]] = True
-            if move.seam in made.correction.left or (seams and move.kind == 'joint'):
+            if move.seam in made.correction.left or (seams and not along[k]):
                 continue
             poses = {'meant': _six(meant[chosen]), 'commanded': _six(commanded[chosen])}
             out.append({'tool': move.tool.tolist(), **poses})

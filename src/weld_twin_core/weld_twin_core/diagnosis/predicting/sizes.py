@@ -7,10 +7,10 @@ No arm is exact, but most of what it could have it has next to nothing of. Every
 has one of a few sizes, and a model is a choice of sizes. Models are drawn as often as the recordings
 vouch for them: one size after the other given all other sizes [1]_, whatever the values of the
 coordinates are. Given its own value a coordinate that is small would hardly ever become large. What
-sizes are usual is learned along, family by family and from all families of a kind together. What no data could
-show, for it is one with a fitted frame or does nothing in them, is as wide as machines have it, but for
-what the others of its family show: that an arm is good in one thing is no witness of what nobody looked
-at.
+sizes are usual is learned along, family by family and from all families of a kind together. What no
+data could show, for it is one with a fitted frame or does nothing in them, is as wide as machines have
+it, but for what the others of its family show: that an arm is good in one thing is no witness of what
+nobody looked at.
 
 References
 ----------

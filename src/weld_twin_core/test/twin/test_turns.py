@@ -141,15 +141,17 @@ def test_a_tool_that_swings_is_less_sure_where_joints_were_just_accelerated():
 
 def test_white_noise_hides_less_of_an_arm_than_chance_might():
     """A part of the noise may be the arm's as an error of its may be: next to nothing, most likely."""
-    robot, rng = load('ur5'), np.random.default_rng(0)
-    t, q = swinging(rng)
-    hides = allowed(*fitted(robot, t, q, q, ZERO, rng)).discrepancy.position
-    uneven = q.copy()
+    robot, every = load('ur5'), []
+    for seed in reversed(range(5)):  # of two in ten some neighbours err alike by chance
+        rng = np.random.default_rng(seed)
+        t, q = swinging(rng)
+        every.append(allowed(*fitted(robot, t, q, q, ZERO, rng)).discrepancy.position)
+    hides, uneven = np.median(every), q.copy()
     uneven[:, 1] += 3e-5 * np.sin(150.0 * q[:, 1])  # finer than any wave or curve
     rest = allowed(*fitted(robot, t, q, uneven, ZERO, rng)).discrepancy
     shows = np.hypot(rest.position, 0.5 * rest.gears[1])
     # Of 2,000 samples with 20 um, 128 at a time, one standard error of a variance is (0.8 um)^2.
-    assert 0.0 < hides < 0.4e-6
+    assert 0.0 < hides**2 < 0.5 * 0.8e-6**2
     assert 3e-6 < shows < 3e-5  # 3e-5 rad at half a metre are 11 um RMS
 
 

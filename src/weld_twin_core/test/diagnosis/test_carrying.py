@@ -168,6 +168,21 @@ def test_a_sure_leader_is_not_asked():
     assert borne_out(Found(candidate_sets), never, Beliefs()).candidate_sets == candidate_sets
 
 
+def test_what_an_instrument_reads_too_long_is_not_mended_on_the_arm(robot):
+    """Links, base and tool can look like a scale of the instrument, and a program needs none of it."""
+    zero, scale = wt.effects.JointOffset('elbow_joint', 1e-3), wt.effects.MeasurementScale(2e-4)
+    seen = motion(robot, [zero, scale], 0.8)
+    kinds = {'joint_offset', 'link_length', 'gear_ratio', 'base_pose', 'tool_pose'}
+    found = wt.diagnose(seen, robot, exclude=REGISTRY.keys() - kinds, experiment=False)
+    effects, _ = found.posterior.of_the_arm().centred(found.model.found, 0)
+    named, middle, true = (
+        wt.Twin(robot, e).poses(seen).position for e in (found.model.found, effects, (zero,))
+    )
+    off = np.linalg.norm(true, axis=1).mean() * 2e-4
+    assert np.linalg.norm(named - true, axis=1).mean() > 0.8 * off
+    assert np.linalg.norm(middle - true, axis=1).mean() < 0.2 * off
+
+
 def test_an_arm_may_have_grown_where_it_is_known_how_warm_it_was(robot):
     """All metals grow: on a warmer day the arm is less sure, and no program has to say how warm."""
     zero = wt.effects.JointOffset('elbow_joint', 1e-3)

@@ -168,7 +168,7 @@ def loose(robot, rng, count):
 def test_what_a_cause_without_a_name_leaves_of_stations_is_no_noise():
     """Lone stations do not tell what a model lacks from noise; that it lacks something does."""
     robot, held = load('ur5'), {False: [], True: []}
-    for seed in range(3):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         made = fitted_to(robot, *loose(robot, rng, 40), ZERO, rng)
         joints, places = loose(robot, rng, 300)
@@ -181,7 +181,7 @@ def test_what_a_cause_without_a_name_leaves_of_stations_is_no_noise():
                 'mi,mi->m', error, np.linalg.solve(covariance, error[..., None])[..., 0]
             )
             own.append((size < 6.251).mean())  # 90 % of chi squared with three freedoms
-    assert np.mean(held[False]) < 0.88 < np.mean(held[True]) < 0.98
+    assert np.mean(held[False]) < 0.9 < np.mean(held[True]) < 0.98
 
 
 @pytest.mark.parametrize(

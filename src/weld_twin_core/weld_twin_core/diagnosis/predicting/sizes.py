@@ -50,11 +50,12 @@ SWEEPS, LEARNING = 100, 20
 """Models drawn, and those until the chain has forgotten where it was: on six sealed cells means of three
 chains were a third of a standard deviation off that of a long one, which two ends agreed on."""
 FEW = 4
-"""Times as many where rows are fewer than coordinates, and models differ more: of 15 stations of a measured
-arm chains led 0.69 to 1.32 times as far astray as the best plain fit, these 0.78 to 0.99 times."""
+"""Times as many where rows are fewer than coordinates, and models differ more: of a measured arm's 15
+stations chains led 0.69 to 1.32 times as far astray as the best plain fit, these 0.78 to 0.99."""
 KEPT = LEARNING
 """Every so many models one is kept: it has forgotten the one before."""
 GEARS, GEOMETRY, MEASURING = range(3)
+"""Whose small errors are."""
 SEED = 1
 """Of the draws: the same recordings give the same posterior."""
 

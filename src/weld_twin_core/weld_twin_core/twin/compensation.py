@@ -214,7 +214,7 @@ def commandable(effect: Effect) -> bool:
     return acts(effect) and effect.name != _ROUNDING
 
 
-def acts(effect: Effect) -> bool:
+def acts(effect: Effect | type[Effect]) -> bool:
     """Tell whether an effect moves the tool on a motion to come, which nobody measures."""
     return effect.name not in _BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
 

@@ -54,9 +54,9 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
         if direct is None and recording.measured is not None:
             reported = recording.measured.sigma
             direct = None if reported is None else float(np.median(reported))
+            independent &= direct is not None
             if direct is None and static:
                 direct = _neighbours(position, remaining)
-            independent &= direct is not None
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3))
         if direct is None:

@@ -55,14 +55,13 @@ def noise_floor(problem: Problem, residuals: list[Array], least: float = 0.0) ->
             reported = recording.measured.sigma
             direct = None if reported is None else float(np.median(reported))
             independent &= direct is not None
-            if direct is None and static:
-                direct = _neighbours(position, remaining)
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3))
         if direct is None:
-            sigma = min(remaining, WIDEST)
+            between = max(_between(position), least) if static else remaining
+            sigma = min(_less(between, remaining, position.size), WIDEST)
         else:
-            sigma = remaining if surely_less(remaining, direct, position.size) else direct
+            sigma = _less(remaining, direct, position.size)
         estimates.append((share * sigma, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)
@@ -73,21 +72,21 @@ def spread_of(position: Array) -> float:
     return min(robust_spread(position), float(np.sqrt((position**2).mean())))
 
 
-def surely_less(one: float, other: float, count: int) -> bool:
-    """Return whether a spread is below another by no chance, of so many numbers."""
-    return one < (1.0 - SURELY * SPREAD_ERROR / np.sqrt(max(count, 1))) * other
+def _less(one: float, other: float, count: int) -> float:
+    """Return a spread that is below another by no chance, of so many numbers; else the other."""
+    by_chance = 1.0 - SURELY * SPREAD_ERROR / np.sqrt(max(count, 1))
+    return one if one < by_chance * other else other
 
 
-def _neighbours(position: Array, remaining: float) -> float | None:
+def _between(position: Array) -> float:
     """
-    Return the noise of stations as one differs from the next; None where they differ as much as any.
+    Return the noise of stations as one differs from the next.
 
     Noise is new at every station. What hangs together from one to the next is none: a mount that creeps
     or steps, or an arm whose stations go from place to place. Differences hold the misfit of two
     stations, so the noise is at most that.
     """
-    change = robust_spread(np.diff(position, axis=1)) / float(np.sqrt(2.0))
-    return change if surely_less(change, remaining, position.size) else None
+    return robust_spread(np.diff(position, axis=1)) / float(np.sqrt(2.0))
 
 
 def _differences(position: Array) -> float | None:

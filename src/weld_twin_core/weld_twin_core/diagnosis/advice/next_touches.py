@@ -190,9 +190,8 @@ def _rows(
 def _root(information: Array) -> Array:
     """Return a root of the inverse of a normal matrix."""
     size = np.sqrt(np.diag(information))
-    size[size == 0.0] = (
-        1.0  # touched points see no turn of the tool, and of a curve nothing is believed
-    )
+    # Touched points see no turn of the tool, and of a curve nothing is believed.
+    size[size == 0.0] = 1.0
     strength, ways = np.linalg.eigh(information / np.outer(size, size))
     strength = np.maximum(strength, ROUNDING * strength[-1])
     return np.asarray(ways / np.sqrt(strength) / size[:, None])

@@ -9,6 +9,7 @@ import numpy as np
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, halton
+from weld_twin_core.diagnosis.predicting.allowed import POSTURES as ANYWHERE
 from weld_twin_core.diagnosis.predicting.planned import JUDGED, clear_postures
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import centred, polish
@@ -34,8 +35,6 @@ CLOSED = 1e-6
 """Distance [m, rad] at which a place is reached."""
 SIDES = 6
 """Numbers that make a box: its lower and its upper corner."""
-ANYWHERE = 200
-"""Postures of the whole reach, as a diagnosis judges it."""
 
 
 def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:

@@ -12,7 +12,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from ...arm.channels import Shift
 from ...arm.robot import Robot
@@ -214,12 +213,14 @@ class Problem:
         Rows have lost it, found from all postures of a place. Who fits some of them finds it anew:
         else those that are left out would be told by the place that they helped to find.
         """
-        out = [np.zeros((0, c * m)) for c, m in zip(self.rows, self.samples, strict=True)]
+        ends = np.cumsum([0, *(c * m for c, m in zip(self.rows, self.samples, strict=True))])
+        out = [np.zeros((0, ends[-1]))]
         for k, own in enumerate(self.places_taken(scale)):
             if own is not None:
                 ways, remaining = own
-                out[k] = ways[remaining == 0.0]
-        return np.asarray(block_diag(*out))
+                beside = (0, 0), (ends[k], ends[-1] - ends[k + 1])
+                out.append(np.pad(ways[remaining == 0.0], beside))
+        return np.concatenate(out)
 
     @cached_property
     def samples(self) -> tuple[int, ...]:

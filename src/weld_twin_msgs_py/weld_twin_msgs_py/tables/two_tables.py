@@ -110,8 +110,9 @@ def _named_alike(
 ) -> tuple[str, NDArray[np.intp], NDArray[np.intp]] | None:
     """Return a column of both files that tells their rows apart, and the rows that it pairs."""
     headers = [name.casefold() for name in seen.header]
+    values = {*joints, *time_columns(log.header)}
     for k, name in enumerate(log.header):
-        if name in (*joints, *time_columns(log.header)) or name.casefold() not in headers:
+        if name in values or name.casefold() not in headers:
             continue
         at = headers.index(name.casefold())
         own, others = [row[k] for row in log.rows], {row[at]: i for i, row in enumerate(seen.rows)}

@@ -56,18 +56,26 @@ def test_nodes_end_quietly_when_told_to_end(cell, tmp_path):
 
 
 TOLD_WHILE_A_CLASS_IS_MADE = """
-import os, signal
+import os, signal, sys
+from weld_twin_nodes.live.recorder import Recorder
 from weld_twin_nodes.live.run_node import run
-raise SystemExit(run(lambda: exec('os.kill(os.getpid(), signal.SIGTERM); import json')))
+TOLD = 'os.kill(os.getpid(), signal.SIGTERM); import json'
+raise SystemExit(run(lambda: [*map(exec, [TOLD] * int(sys.argv[1])), Recorder()].pop()))
 """
 
 
-def test_a_program_told_to_end_while_it_is_still_loading_ends_quietly(tmp_path):
+@pytest.mark.parametrize('times', [1, 2])
+def test_a_program_told_to_end_while_its_node_is_made_ends_quietly(tmp_path, times):
+    """The node is made, and ends as any other does; told again, the program does not wait for it."""
     program = tmp_path / 'program.py'
     program.write_text(TOLD_WHILE_A_CLASS_IS_MADE)
-    command = [sys.executable, '-m', program.stem]  # as a node is started
+    command = [sys.executable, '-m', program.stem, str(times)]  # as a node is started
+    command += ['--ros-args', '-p', 'out:=bag', '-p', "topics:=['/joint_states']"]
     done = subprocess.run(command, check=False, capture_output=True, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, b'')
+    assert done.returncode == 0
+    assert b'Traceback' not in done.stderr
+    assert (tmp_path / 'bag/metadata.yaml').exists() == (times == 1)
+    assert not (tmp_path / 'bag.unfinished').exists()
 
 
 def test_a_recorder_that_cannot_record_leaves_nothing(cell, tmp_path):

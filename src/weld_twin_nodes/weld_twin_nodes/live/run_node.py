@@ -45,7 +45,7 @@ def executor(name: str = 'events') -> Executor:
 
 class Ended(BaseException):
     """
-    The wish to end, before there is a node that could meet it.
+    The second wish to end, before there is a node that could meet the first.
 
     An interpreter that a KeyboardInterrupt has met within ``exec`` of text, as dataclasses are
     made, kills itself at its end, however that was handled.
@@ -57,7 +57,8 @@ class Stop:
     Ctrl-C and SIGTERM as a wish that the node meets in its own time.
 
     rclpy would close ROS under the node, and what has reached the process but not the node would
-    be lost. Before there is a node the wish ends the program at once.
+    be lost. A node that is being made is finished first: half of one would leave half a bag, or
+    threads of the middleware that keep the program alive. Who tells it again will not wait for that.
     """
 
     def __init__(self) -> None:
@@ -69,8 +70,8 @@ class Stop:
             atexit.register(signal.signal, number, signal.SIG_IGN)
 
     def _take(self, *_: object) -> None:
-        first, self.wished = not self.wished, True
-        if first and self.node is None:
+        again, self.wished = self.wished, True
+        if again and self.node is None:
             raise Ended
 
 

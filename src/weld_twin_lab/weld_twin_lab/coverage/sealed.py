@@ -172,7 +172,12 @@ def _of_path(
 def _of_shrink(
     case: SealedCase, found: Diagnosis, train: Recording
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the shrink that is told, and that on the sealed motion, inside and outside."""
+    """
+    Yield the shrink that is told, and that on the sealed motion, inside and outside.
+
+    It is told of a motion. Of the lesser part of one, a few samples in a corner perhaps, it says less:
+    such parts are counted by themselves.
+    """
     test = case.recorded('test')
     assert found.shrink is not None
     bare = nominal_on(case.cell.robot, found.model.known, train, case.cell.align)
@@ -181,7 +186,8 @@ def _of_shrink(
     good = within(test) & (after < GROSS * np.median(after))
     for region, mask in _regions(found, test, good):
         true = rms(after[mask, None]) / rms(before[mask, None])
-        yield region, told_shrink(found.shrink, true, region)
+        part = '' if 2 * mask.sum() > good.sum() else 'a part '
+        yield f'{part}{region}', told_shrink(found.shrink, true, region)
 
 
 def told_shrink(told: Shrink, true: float, region: str) -> dict[str, Any]:

@@ -83,7 +83,13 @@ class Examined:
     def unsound_with(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
         kept = {effect.key for effect in result}
-        slips = (slip for slip in self.slips if slip.effect.key in kept)
+        # What looked nearly the same was weighed beside it, and is among the candidates.
+        slips = (
+            replace(slip, effect=each, others=())
+            for slip in self.slips
+            for each in slip.any_of
+            if each.key in kept
+        )
         own = (_gave_way(slip, self.given).as_unsound(applied=True) for slip in slips)
         return (*self.unsound, *own)
 
@@ -187,7 +193,8 @@ class _Look(NamedTuple):
         """Return the problem with what gave way, and the model with what was undone."""
         if self.posed is None:
             return None
-        problem = replace(self.posed[0], dated=tuple(slip.effect for slip in self.dated))
+        sudden = tuple(each for slip in self.dated for each in slip.any_of)
+        problem = replace(self.posed[0], dated=sudden)
         sentences = tuple(each.sentence for each in mistakes)
         made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
         return problem, replace(self.posed[1], mended=sentences, mends=made)

@@ -302,6 +302,11 @@ class Slip:
     def kind(self) -> str:
         return _WORDS[type(self.effect)][0]
 
+    @property
+    def any_of(self) -> tuple[Sudden, ...]:
+        """Return everything that it may have been; the evidence of a whole fit decides."""
+        return (self.effect, *self.others)
+
     def time(self, recording: Recording) -> float:
         """Return when [s] by its recording's stamps, between the measurements before and after."""
         return self.effect.time - recording.later

@@ -198,6 +198,27 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
 
 
 @pytest.mark.parametrize(
+    ('seed', 'entry'),
+    [
+        (1, {'effect': 'tool_slip', 'xyz': [2e-4, 1e-4, 5e-5]}),
+        (3, {'effect': 'instrument_knock', 'xyz': [2e-4, 1e-4, 0.0], 'rotvec': [0.0, 1e-4, 1e-4]}),
+        (0, {'effect': 'joint_slip', 'joint': 'elbow_joint', 'offset': 3e-4}),
+    ],
+)
+def test_what_looks_alike_on_a_short_motion_is_weighed_by_all_that_was_measured(ur5, seed, entry):
+    rng = np.random.default_rng(seed)
+    effects = effects_from_list([{**entry, 'time': 10.5}], ur5)
+    motion = moving(ur5, rng, size=0.25)
+    bad = recorded(ur5, motion, rng, effects, sigma=4e-5, points=True)
+    assert examine(Given((bad,), ur5)).slips[0].others
+    found = diagnose([bad], ur5, exclude=MOVING, experiment=False)
+    (named,) = [each.effect for each in found.effects]
+    assert (named.name, named.site) == (entry['effect'], entry.get('joint'))
+    (told,) = found.unsound
+    assert told.applied and not told.alike and 'would look the same' not in told.sentence
+
+
+@pytest.mark.parametrize(
     ('epoch', 'backwards'),
     [(0, False), (1_790_000_000 * 10**9, False), (1_790_000_000 * 10**9, True)],
 )

@@ -123,12 +123,16 @@ def test_how_sure_an_answer_is_counts_by_cover_width_and_crps(case, truth, tmp_p
     assert point(geometry.never_knows(read_case(case[0])), truth).crps_m is None
 
 
-def test_the_scales_are_what_they_are(case, truth):
+def test_the_scales_are_what_they_are(case, truth, tmp_path):
     silent = point(geometry.never_knows(read_case(case[0])), truth)
     assert silent.left == pytest.approx(1.0)
     assert silent.detected and not silent.family and silent.belief == 0.0
-    wrong = point(geometry.zero_offset(read_case(case[0])), truth)
-    assert wrong.sure_wrong and not wrong.family
+    wrong = geometry.zero_offset(read_case(case[0]))
+    assert point(wrong, truth).sure_wrong and not point(wrong, truth).family
+    # Who says which of its names are sure is not judged by how likely they are.
+    for sure in (True, False):
+        write_answer(tmp_path / str(sure), replace(wrong, sure=(*(sure for _ in wrong.causes), False)))
+        assert point(read_answer(tmp_path / str(sure), 80), truth).sure_wrong is sure
 
 
 def test_names_beyond_three_of_one_cause_do_not_count(case, truth):

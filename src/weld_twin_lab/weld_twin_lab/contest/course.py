@@ -203,6 +203,7 @@ def write_answer(folder: Path, answer: ContestAnswer) -> None:
         ],
         'unknown': answer.unknown,
         'none': answer.none,
+        **({} if answer.sure is None else {'sure': answer.sure}),
     }
     write_json(folder / ANSWER, content, overwrite=True)
     parts = [answer.predicted, *([] if answer.sigma is None else [answer.sigma])]
@@ -218,12 +219,16 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
             for cause in said['causes']
         )
         unknown, none = float(said['unknown']), float(said['none'])
+        known = said.get('sure')
+        told = None if known is None else tuple(bool(each) for each in known)
         predicted = _read(folder / PREDICTED)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(f"'{folder}' holds no answer: {error}") from None
     likely = [unknown, none, *(p for cause in causes for *_, p in cause)]
     if not all(0.0 <= value <= 1.0 + _SLACK for value in likely):
         raise DataError(f"'{folder / ANSWER}' has a probability that is not between 0 and 1")
+    if told is not None and len(told) != len(causes) + 1:
+        raise DataError(f"'{folder / ANSWER}' must say of each cause and of the whole if it is sure")
     if predicted.shape not in ((count, 3), (count, 6)) or not np.isfinite(predicted).all():
         raise DataError(
             f"'{folder / PREDICTED}' must have {count} rows of three or six finite numbers, it has "
@@ -232,7 +237,7 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
     sigma = predicted[:, 3:] if predicted.size > 3 * count else None
     if sigma is not None and (sigma <= 0.0).any():
         raise DataError(f"'{folder / PREDICTED}' has a standard deviation that is not positive")
-    return ContestAnswer(predicted[:, :3], causes, unknown, none, sigma=sigma)
+    return ContestAnswer(predicted[:, :3], causes, unknown, none, told, sigma)
 
 
 SAID = 'said.txt'

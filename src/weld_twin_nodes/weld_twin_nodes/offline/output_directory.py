@@ -288,7 +288,11 @@ def new_directory(
     with scratch as hidden:
         made = hidden / MADE
         made.mkdir()
-        yield made
+        try:
+            yield made
+        except DataError as error:  # of a full disk, say: people know the place that they gave
+            error.args = (str(error).replace(str(made), str(path)),)
+            raise
         try:
             _install(target, scratch, mark, force, adds)
         except OSError as error:

@@ -330,6 +330,16 @@ def test_a_text_whose_writer_was_killed_leaves_nothing_beside_it(tmp_path):
     assert content(tmp_path) == {'a.json': b'whole'}
 
 
+def test_what_cannot_be_written_is_told_by_the_place_that_was_given(tmp_path):
+    with (
+        pytest.raises(DataError, match=f"^'{tmp_path}/found/file/page.html' cannot be written: "),
+        new_directory(tmp_path / 'found', mark='page.html') as hidden,
+    ):
+        (hidden / 'file').touch()
+        write_text(hidden / 'file/page.html', '')
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_folder_that_cannot_be_written_is_a_sentence(program, tmp_path):
     (tmp_path / 'file').write_text('mine')
     for out in (tmp_path / 'file', tmp_path / 'file/below'):

@@ -350,6 +350,12 @@ def test_an_axis_beside_the_arm_is_the_joint_that_slides(tmp_path):
     np.testing.assert_allclose(of(tmp_path, bare, robot, options)[0].joints.q, q, atol=2e-6)
 
 
+def test_columns_that_serve_nothing_are_told(tmp_path):
+    names = ','.join([*(f'A{k} [deg]' for k in range(1, 7)), *XYZ, 'E1 [mm]'])
+    _, said = of(tmp_path, lines(names, rows(DEG, MM, np.arange(12.0)[:, None])), ARM)
+    assert 'not used: E1 [mm]' in said
+
+
 @pytest.mark.parametrize('form', ['pairs', 'with differences', 'measured first'])
 def test_a_list_of_nominal_and_measured_points_gives_the_measured(tmp_path, form):
     off = np.array([1.0, -2.0, 0.5])

@@ -26,7 +26,7 @@ from .formats import one_of
 from .header import Columns, find_columns
 from .joint_readings import FITS, JointColumns, Units, counted
 from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
-from .words import EULER_ORDERS, OWN, ROTATION_VECTOR, TableOptions, flag_of, tokens
+from .words import EULER_ORDERS, OWN, ROTATION_VECTOR, TableOptions, flag_of, shortened, tokens
 
 COUNTING = 'how the controller counts (--joint-signs, --joint-offsets, --coupled)'
 """What to look at where orientations disagree with the arm, beside the columns."""
@@ -205,6 +205,8 @@ class _Reading:
         """Return what the table means, and the units of the joints whose columns name none."""
         cells, robot, columns, said = self.cells, self.robot, self.columns, self.said
         said.append('joint columns are ' + ', '.join(columns.joints))
+        if unused := columns.unused():
+            said.append(f'not used: {shortened(unused)}')
         judge = replace(self, said=[])._relative_misfit
         units = self._joints.units(cells.stack(columns.joints), judge)
         q = self._joints.angles(cells, units)

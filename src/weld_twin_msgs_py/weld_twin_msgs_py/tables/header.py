@@ -74,6 +74,14 @@ class Columns:
         """Return the unit the header gives a column, None when it gives none."""
         return None if name is None else self.units.get(name)
 
+    def unused(self) -> list[str]:
+        """Return the columns that serve nothing."""
+        used = {self.temperature, self.time, self.date}
+        for names in (self.joints, self.position, self.target, self.difference, self.rotation):
+            used.update(names)
+        used.update((*self.effort, *self.sigma))
+        return [name for name in self.units if name not in used]
+
 
 def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> Columns:
     """Return the columns by use."""

@@ -14,7 +14,7 @@ that is taken never or always. Defaults of functions and of dataclasses count as
 
 The tests run once as they are, and it is noted which functions each of them runs. Then a process is
 forked for every mutant. It puts the broken function in the place of the right one and runs the tests
-of its room that reach it, what sees most first, until one fails. Where the time for that is over
+of its room that reach it, those that run least beside it first, until one fails. Where the time for that is over
 before all were asked it is undecided, and counts as not caught. Exits with 1 when fewer than --least
 are caught.
 """
@@ -96,14 +96,12 @@ FOLDERS = {
 PRODUCT, PROOFS = 'product', 'weld_twin_lab'
 """What stands for all packages but that of the proofs."""
 QUICK = 'not slow and not cells'
-CHEAP, SLOW, SPENT = 0.2, 12.0, 24.0
+CHEAP, SLOW, SPENT = 0.2, 12.0, 240.0
 """Seconds, with all calls noted, that a test takes which is asked at once, that one may take, and all of
 them together."""
 ENDS = {0: 'survives', 2: 'undecided', 3: 'no test runs'}
 """What a process ends with whose mutant no test noticed: of all that reach it, in the time, or as none
 does, for it is made when modules are imported or runs in other processes."""
-FIRST = 'test_kept_answers'
-"""What sees most is asked first of the others."""
 LONGEST = 60
 """Seconds of processor time after which a mutant that comes to no end is caught."""
 ALIKE = {
@@ -445,9 +443,7 @@ class Asked:
         if failed:
             print(f'not asked, for they fail as it is: {", ".join(failed)}', flush=True)
         asked = [(seconds, ran, item) for seconds, ran, item in out if ran and seconds < SLOW]
-        return sorted(
-            asked, key=lambda each: (each[0] > CHEAP, FIRST not in each[2].nodeid, each[0])
-        )
+        return sorted(asked, key=lambda each: (each[0] > CHEAP, len(each[1])))
 
     def ran(self, items: Sequence[Any], part: int) -> dict[int, tuple[float, Ran | None]]:
         """Return the seconds of a part of the tests, and what each runs; None of one that fails."""

@@ -14,9 +14,9 @@ that is taken never or always. Defaults of functions and of dataclasses count as
 
 The tests run once as they are, and it is noted which functions each of them runs. Then a process is
 forked for every mutant. It puts the broken function in the place of the right one and runs the tests
-of its room that reach it, those that run least beside it first, until one fails. Where the time for that is over
-before all were asked it is undecided, and counts as not caught. Exits with 1 when fewer than --least
-are caught.
+of its room that reach it, those that run least beside it first, until one fails. Where the time for
+that is over before all were asked it is undecided, and counts as not caught. Exits with 1 when fewer
+than --least are caught.
 """
 
 from __future__ import annotations

@@ -131,7 +131,9 @@ def test_the_scales_are_what_they_are(case, truth, tmp_path):
     assert point(wrong, truth).sure_wrong and not point(wrong, truth).family
     # Who says which of its names are sure is not judged by how likely they are.
     for sure in (True, False):
-        write_answer(tmp_path / str(sure), replace(wrong, sure=(*(sure for _ in wrong.causes), False)))
+        write_answer(
+            tmp_path / str(sure), replace(wrong, sure=(*(sure for _ in wrong.causes), False))
+        )
         assert point(read_answer(tmp_path / str(sure), 80), truth).sure_wrong is sure
 
 

@@ -228,7 +228,9 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
     if not all(0.0 <= value <= 1.0 + _SLACK for value in likely):
         raise DataError(f"'{folder / ANSWER}' has a probability that is not between 0 and 1")
     if told is not None and len(told) != len(causes) + 1:
-        raise DataError(f"'{folder / ANSWER}' must say of each cause and of the whole if it is sure")
+        raise DataError(
+            f"'{folder / ANSWER}' must say of each cause and of the whole if it is sure"
+        )
     if predicted.shape not in ((count, 3), (count, 6)) or not np.isfinite(predicted).all():
         raise DataError(
             f"'{folder / PREDICTED}' must have {count} rows of three or six finite numbers, it has "

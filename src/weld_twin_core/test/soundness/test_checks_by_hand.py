@@ -12,6 +12,7 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 from weld_twin_core import DataError, JointMotion, Recording, load
 from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.algebra.definite import outside, span_of
+from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.diagnosis.soundness.computed import _gap
 from weld_twin_core.diagnosis.soundness.efforts import compared, efforts, with_sign
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
@@ -463,11 +464,14 @@ def test_what_would_look_the_same_is_told_with_its_place(still):
 
 
 def test_of_one_recording_what_gave_way_is_for_the_search_to_weigh(ur5, still):
-    slip = Slip(ToolSlip(time=11.5), 0, 2e-3, 90.0)
+    knock = InstrumentKnock(time=12.5)
+    slip = Slip(ToolSlip(time=11.5), 0, 2e-3, 90.0, (knock,))
     found = Examined(Given((still,), ur5), asked(ur5, still), (), (), (), (slip,))
-    assert [item.kind for item in found.unsound_with([ToolSlip(time=11.5)])] == [
-        'reflector_jumped'
-    ]
+    (jumped,) = found.unsound_with([slip.effect])
+    assert jumped.kind == 'reflector_jumped' and not jumped.alike
+    (knocked,) = found.unsound_with([knock], [(Site.of(slip.effect), Site.of(knock))])
+    assert knocked.kind == 'instrument_knocked' and 'at station 13 of 40' in knocked.sentence
+    assert knocked.alike == (('reflector_jumped', ('tool',)),)
     assert found.unsound_with([]) == ()
 
 

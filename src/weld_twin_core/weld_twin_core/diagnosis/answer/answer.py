@@ -134,7 +134,7 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
         'checks': (*examined.checks, *_undetectable_check(list_undetectable(*fitted, named))),
         'changed': list_changes(*fitted, result.scale, result.precision, named),
         'may_change': named,
-        'unsound': examined.unsound_with(result.final.model.found),
+        'unsound': examined.unsound_with(result.final.model.found, verdict.sets),
         'same': never_parted(result.baseline.model.robot, result.work.problem.align, verdict.sets),
     }
 

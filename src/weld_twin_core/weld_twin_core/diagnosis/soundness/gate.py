@@ -21,7 +21,7 @@ from ..frames.aligned import aligned, tracked_part
 from ..frames.alignment import refined
 from ..frames.changes import with_changes
 from ..limits import MOST
-from ..result import Check, Unsound
+from ..result import Check, Site, Unsound
 from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Finding, mistake
@@ -80,12 +80,17 @@ class Examined:
     slips: tuple[Slip, ...] = ()
     """What seems to have given way at an instant: causes that ``posed`` offers the search."""
 
-    def unsound_with(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
-        """Return the mistakes, and the slips that a fit has among what it found."""
+    def unsound_with(
+        self, result: Sequence[Effect], sets: Sequence[Sequence[Site]] = ()
+    ) -> tuple[Unsound, ...]:
+        """
+        Return the mistakes, and the slips that a fit has among what it found.
+
+        sets: sites that all the data do not tell apart; what else looked the same at first is out.
+        """
         kept = {effect.key for effect in result}
-        # What looked nearly the same was weighed beside it, and is among the candidates.
         slips = (
-            replace(slip, effect=each, others=())
+            slip.told_as(each, sets)
             for slip in self.slips
             for each in slip.any_of
             if each.key in kept

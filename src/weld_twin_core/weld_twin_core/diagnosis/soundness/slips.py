@@ -34,6 +34,7 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.motions import moved_most, plain_causes
 from ..algebra.problem import Model, Problem, Scale
 from ..limits import FEW, MARGIN, MOST, TINY, WIDER
+from ..result import Site
 from .lag import KEPT
 from .lengths import instant, length
 
@@ -306,6 +307,12 @@ class Slip:
     def any_of(self) -> tuple[Sudden, ...]:
         """Return everything that it may have been; the evidence of a whole fit decides."""
         return (self.effect, *self.others)
+
+    def told_as(self, one: Sudden, sets: Sequence[Sequence[Site]]) -> Slip:
+        """Return it as one of these, beside those that all data do not tell from that one."""
+        own = next((group for group in sets if Site.of(one) in group), ())
+        others = (each for each in self.any_of if each is not one and Site.of(each) in own)
+        return replace(self, effect=one, others=tuple(others))
 
     def time(self, recording: Recording) -> float:
         """Return when [s] by its recording's stamps, between the measurements before and after."""

@@ -467,12 +467,12 @@ def test_of_one_recording_what_gave_way_is_for_the_search_to_weigh(ur5, still):
     knock = InstrumentKnock(time=12.5)
     slip = Slip(ToolSlip(time=11.5), 0, 2e-3, 90.0, (knock,))
     found = Examined(Given((still,), ur5), asked(ur5, still), (), (), (), (slip,))
-    (jumped,) = found.unsound_with([slip.effect])
+    (jumped,) = found.unsound_with([slip.effect], [])
     assert jumped.kind == 'reflector_jumped' and not jumped.alike
     (knocked,) = found.unsound_with([knock], [(Site.of(slip.effect), Site.of(knock))])
     assert knocked.kind == 'instrument_knocked' and 'at station 13 of 40' in knocked.sentence
     assert knocked.alike == (('reflector_jumped', ('tool',)),)
-    assert found.unsound_with([]) == ()
+    assert found.unsound_with([], []) == ()
 
 
 # Efforts ----------------------------------------------------------------------------------------

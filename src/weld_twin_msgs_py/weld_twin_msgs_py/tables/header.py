@@ -76,10 +76,10 @@ class Columns:
 
     def unused(self) -> list[str]:
         """Return the columns that serve nothing."""
-        used = {self.temperature, self.time, self.date}
-        for names in (self.joints, self.position, self.target, self.difference, self.rotation):
-            used.update(names)
-        used.update((*self.effort, *self.sigma))
+        used = {self.temperature, self.time, self.date}.union(
+            *(self.joints, self.position, self.target, self.difference),
+            *(self.rotation, self.effort, self.sigma),
+        )
         return [name for name in self.units if name not in used]
 
 

@@ -81,7 +81,7 @@ class Examined:
     """What seems to have given way at an instant: causes that ``posed`` offers the search."""
 
     def unsound_with(
-        self, result: Sequence[Effect], sets: Sequence[Sequence[Site]] = ()
+        self, result: Sequence[Effect], sets: Sequence[Sequence[Site]]
     ) -> tuple[Unsound, ...]:
         """
         Return the mistakes, and the slips that a fit has among what it found.
